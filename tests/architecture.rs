@@ -547,7 +547,7 @@ fn incoming_messages_stay_values() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Lines that speak of what can be done otherwise: that stands below deviations, and takes hold at the seam.
+/// Lines that speak of what can be done otherwise: that stands below deviations, and takes hold at the hook points.
 fn lines_about_deviating(text: &str) -> Vec<(usize, &str)> {
     let words = ["fault", "tolerance", "libert", "deviation", "persona", "lapse"];
     // Members of the protocol, and what every language has.
@@ -576,7 +576,7 @@ fn lines_about_deviating(text: &str) -> Vec<(usize, &str)> {
 #[test]
 fn the_reference_devices_keep_to_the_standard() {
     let rooms = ["reference/agv/", "reference/master_control/"];
-    let room = |name: &str| rooms.iter().any(|room| name.starts_with(room)) && !name.ends_with("/seam.rs");
+    let room = |name: &str| rooms.iter().any(|room| name.starts_with(room)) && !name.ends_with("/hooks.rs");
     let mut wrong = Vec::new();
     for (path, text) in sources()
         .iter()

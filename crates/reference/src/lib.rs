@@ -5,6 +5,8 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+#[macro_use]
+mod hooks;
 pub mod agv;
 pub mod deviations;
 pub mod master_control;
@@ -13,7 +15,7 @@ use std::time::Duration;
 
 use tck_base::clock::{Moment, Stamp};
 
-/// How a reference device opens its MQTT connection.
+/// Options with which a reference device opens its MQTT connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ConnectOptions {
     /// MQTT protocol level: 4 is MQTT 3.1.1. Links over real sockets speak no other.
@@ -43,7 +45,7 @@ pub struct Publication {
     pub retain: bool,
 }
 
-/// What happens to a reference device.
+/// Event that a reference device is told.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Input {
     /// The connection was accepted and the subscriptions acknowledged.
@@ -81,7 +83,7 @@ pub enum Download {
     Failed(String),
 }
 
-/// What a reference device wants done.
+/// Request of a reference device to its driver.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Output {
     /// Publish a message. Dropped by the driver while there is no connection.
@@ -122,6 +124,17 @@ pub struct Fault {
     pub name: &'static str,
     /// The requirements it breaks. The first one is the one it is about.
     pub breaks: &'static [&'static str],
-    /// What is wrong, in one sentence about the vehicle.
+    /// Sentence that says what is wrong with the device.
     pub wrong: &'static str,
+}
+
+/// One switchable tolerance of a reference device: what a good device may do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Tolerance {
+    /// Name, in kebab-case, such as `every-state-twice`.
+    pub name: &'static str,
+    /// The requirements that leave it to the device.
+    pub under: &'static [&'static str],
+    /// Sentence that says what the device does.
+    pub does: &'static str,
 }

@@ -6,9 +6,9 @@
 
 use super::action_kinds::{self, Scope};
 use super::actions::Origin;
-use super::book::Place;
 use super::objections::{Asked, Lack, Objection};
 use super::order_message::{Edge, Node, Order};
+use super::order_state::Place;
 use super::rejection::{Refusal, Rule};
 use super::{Agv, motion};
 
@@ -19,7 +19,7 @@ const SIDEWAYS: f64 = 0.1;
 pub(crate) const SLOWEST: f64 = 0.01;
 
 impl Agv {
-    /// Where a node is: as the order says, else as the layout knows. A line-guided vehicle only knows its layout.
+    /// Place of a node: as the order says, else as the layout knows. A line-guided vehicle only knows its layout.
     pub(crate) fn place(&self, node: &Node) -> Option<Place> {
         if let Some(position) = node.position.as_ref().filter(|_| !self.config.line_guided()) {
             return Some(Place {
@@ -74,7 +74,7 @@ impl Agv {
 
     /// An order that does not fit into the memory is refused as a whole (ORD-REJ-15).
     fn check_memory(&self, order: &Order, known: usize) -> Result<(), Refusal> {
-        let released = self.book.nodes.iter().filter(|stop| stop.node.released);
+        let released = self.order.nodes.iter().filter(|stop| stop.node.released);
         let left = if known == 0 { 0 } else { released.count() };
         if left + order.nodes.len() > self.config.max_nodes {
             let refusal = Refusal::at_field(Rule::Memory, "the order has too many nodes", "nodes");
@@ -197,7 +197,7 @@ impl Agv {
     fn id_taken(&self, id: &str, known: usize) -> bool {
         self.actions.get(id).is_some_and(|action| match action.origin {
             Origin::Instant => known > 0 || !action.status.is_terminal(),
-            Origin::Node(sequence_id) | Origin::Edge(sequence_id) => known > 0 && sequence_id <= self.book.base_end.1,
+            Origin::Node(sequence_id) | Origin::Edge(sequence_id) => known > 0 && sequence_id <= self.order.base_end.1,
         })
     }
 }

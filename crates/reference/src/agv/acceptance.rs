@@ -10,10 +10,10 @@ use serde_json::Value;
 use super::Agv;
 use super::action_kinds;
 use super::actions::{Action, Origin, Status};
-use super::book::{Book, Stop};
+use super::hook_points::{Event, Permission};
 use super::objections::{Adoption, Objection, Relation};
 use super::order_message::{ActionRequest, Edge, Node, Order};
-use super::points::{Event, Permission};
+use super::order_state::{OrderState, Stop};
 use super::rejection::{Refusal, Rule};
 
 /// What to do with an order.
@@ -60,12 +60,12 @@ impl Agv {
             self.happens(Event::SeenAgain);
             return Ok(());
         }
-        let adoption = Adoption {
+        let mut adoption = Adoption {
             order: &mut order,
             message,
             update,
         };
-        match self.adopts(adoption) {
+        match self.adopts(&mut adoption) {
             true if update => self.continue_with(order),
             true => self.begin(order),
             false => {}
@@ -91,13 +91,13 @@ impl Agv {
 
     /// The decision table of figure 8, with the gates it leaves out.
     fn decide(&self, order: &Order) -> Result<Decision, Refusal> {
-        let new = order.id != self.book.order_id;
-        if !new && order.update_id == self.book.update_id {
-            self.objects(order, Relation::Known)?;
+        let new = order.id != self.order.order_id;
+        if !new && order.update_id == self.order.update_id {
+            self.objected(order, Relation::Known)?;
             let again = self.allows(Permission::BeginAgain, false);
             return Ok(if again { Decision::Begin } else { Decision::Discard });
         }
-        if !new && order.update_id < self.book.update_id {
+        if !new && order.update_id < self.order.update_id {
             let refusal = Refusal::new(Rule::Outdated, "the order update is older than the current one");
             self.object(Objection::Outdated, refusal)?;
         }
@@ -122,7 +122,7 @@ impl Agv {
             let refusal = Refusal::new(Rule::OtherOrderActive, "another order is active");
             self.object(Objection::Busy, refusal)?;
         }
-        self.objects(order, Relation::New)?;
+        self.objected(order, Relation::New)?;
         if first.sequence_id != 0 {
             let path = format!("{}.sequenceId", first.path);
             let refusal = Refusal::at_field(Rule::Malformed, "a new order begins with sequenceId 0", &path);
@@ -141,8 +141,8 @@ impl Agv {
         let open = |action: &Action| action.of_order() && !action.status.is_terminal();
         let counts = |action: &Action| open(action) && self.allows(Permission::Count(action), true);
         let left = |stop: &Stop| self.allows(Permission::CountNode(stop), true);
-        let nodes = !self.book.cancelled && self.book.nodes.iter().any(left);
-        let busy = nodes || self.actions.iter().any(counts) || self.book.cancel.is_some();
+        let nodes = !self.order.cancelled && self.order.nodes.iter().any(left);
+        let busy = nodes || self.actions.iter().any(counts) || self.order.cancel.is_some();
         self.allows(Permission::BeBusy, busy)
     }
 
@@ -170,12 +170,12 @@ impl Agv {
         let moment = self.moment();
         self.motion.halt(moment);
         self.motion.reached = self.is_near(&order.nodes[0]);
-        let last = (std::mem::take(&mut self.book.last_node), self.book.last_sequence);
-        self.book = Book::empty(last.0);
-        self.book.last_sequence = last.1;
-        self.book.order_id.clone_from(&order.id);
-        self.book.update_id = order.update_id;
-        self.book.zoned = order.zone_set.is_some();
+        let last = (std::mem::take(&mut self.order.last_node), self.order.last_sequence);
+        self.order = OrderState::empty(last.0);
+        self.order.last_sequence = last.1;
+        self.order.order_id.clone_from(&order.id);
+        self.order.update_id = order.update_id;
+        self.order.zoned = order.zone_set.is_some();
         self.append(order.nodes, order.edges);
         self.happens(Event::Begun);
     }
@@ -199,13 +199,13 @@ impl Agv {
                 self.push_edge(edge);
             }
             if node.released {
-                self.book.base_end = (node.id.clone(), node.sequence_id);
+                self.order.base_end = (node.id.clone(), node.sequence_id);
             }
             self.push_actions(node.actions.clone(), Origin::Node(node.sequence_id));
-            let before = self.book.edges.back();
+            let before = self.order.edges.back();
             let edge = before.filter(|edge| edge.sequence_id + 1 == node.sequence_id);
             if let Some(place) = self.arrives_at(edge, &node) {
-                self.book.nodes.push_back(Stop { node, place });
+                self.order.nodes.push_back(Stop { node, place });
             }
         }
         edges.for_each(|edge| self.push_edge(edge));
@@ -213,7 +213,7 @@ impl Agv {
 
     fn push_edge(&mut self, edge: Edge) {
         self.push_actions(edge.actions.clone(), Origin::Edge(edge.sequence_id));
-        self.book.edges.push_back(edge);
+        self.order.edges.push_back(edge);
     }
 
     /// Lists actions as WAITING (ASTATE-01).

@@ -8,7 +8,7 @@ use serde_json::Value;
 use super::config::AgvConfig;
 use super::order_message::ActionRequest;
 
-/// Where an action may be asked for.
+/// Scope in which an action may be asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Scope {
     Instant,
@@ -27,9 +27,9 @@ impl Scope {
     }
 }
 
-/// What an action does when it ends.
+/// Effect an action has when it ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Deed {
+pub(crate) enum Effect {
     StartPause,
     StopPause,
     StartCharging,
@@ -65,7 +65,7 @@ pub(crate) struct Parameter {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ActionKind {
     pub(crate) name: &'static str,
-    pub(crate) deed: Deed,
+    pub(crate) effect: Effect,
     pub(crate) scopes: &'static [Scope],
     pub(crate) parameters: &'static [Parameter],
     /// Has a preparation, reported as INITIALIZING.
@@ -143,14 +143,14 @@ const STATION: &[Parameter] = &[optional("stationType", "STRING"), optional("sta
 
 const fn kind(
     name: &'static str,
-    deed: Deed,
+    effect: Effect,
     scopes: &'static [Scope],
     parameters: &'static [Parameter],
     description: &'static str,
 ) -> ActionKind {
     ActionKind {
         name,
-        deed,
+        effect,
         scopes,
         parameters,
         prepares: false,
@@ -187,15 +187,15 @@ impl ActionKind {
 const KINDS: [ActionKind; 20] = [
     kind(
         "startPause",
-        Deed::StartPause,
+        Effect::StartPause,
         INSTANT,
         &[],
         "Stops driving and holds actions",
     ),
-    kind("stopPause", Deed::StopPause, INSTANT, &[], "Goes on after a pause"),
+    kind("stopPause", Effect::StopPause, INSTANT, &[], "Goes on after a pause"),
     kind(
         "startCharging",
-        Deed::StartCharging,
+        Effect::StartCharging,
         INSTANT_NODE,
         &[],
         "Connects to the charger",
@@ -203,7 +203,7 @@ const KINDS: [ActionKind; 20] = [
     .taking_time(),
     kind(
         "stopCharging",
-        Deed::StopCharging,
+        Effect::StopCharging,
         INSTANT_NODE,
         &[],
         "Disconnects from the charger",
@@ -211,45 +211,45 @@ const KINDS: [ActionKind; 20] = [
     .taking_time(),
     kind(
         "initPosition",
-        Deed::InitPosition,
+        Effect::InitPosition,
         INSTANT_NODE,
         POSE,
         "Takes over a pose",
     ),
     kind(
         "enableMap",
-        Deed::EnableMap,
+        Effect::EnableMap,
         INSTANT_NODE,
         MAP,
         "Enables a map on board",
     ),
     kind(
         "downloadMap",
-        Deed::DownloadMap,
+        Effect::DownloadMap,
         INSTANT,
         DOWNLOAD,
         "Fetches a map; mapHash is SHA-256 in hexadecimal",
     ),
-    kind("deleteMap", Deed::DeleteMap, INSTANT, MAP, "Removes a map"),
-    kind("stateRequest", Deed::StateRequest, INSTANT, &[], "Sends a state"),
+    kind("deleteMap", Effect::DeleteMap, INSTANT, MAP, "Removes a map"),
+    kind("stateRequest", Effect::StateRequest, INSTANT, &[], "Sends a state"),
     kind(
         "logReport",
-        Deed::LogReport,
+        Effect::LogReport,
         INSTANT,
         &[required("reason", "STRING")],
         "Stores a log",
     )
     .taking_time()
     .resulting("Name of the log"),
-    kind("pick", Deed::Pick, NODE_EDGE, PICK, "Takes a load")
+    kind("pick", Effect::Pick, NODE_EDGE, PICK, "Takes a load")
         .preparing()
         .pausing(),
-    kind("drop", Deed::Drop, NODE_EDGE, DROP, "Puts the load down")
+    kind("drop", Effect::Drop, NODE_EDGE, DROP, "Puts the load down")
         .preparing()
         .pausing(),
     kind(
         "detectObject",
-        Deed::DetectObject,
+        Effect::DetectObject,
         NODE_EDGE,
         &[optional("objectType", "STRING")],
         "Looks for an object",
@@ -257,7 +257,7 @@ const KINDS: [ActionKind; 20] = [
     .resulting("What was detected"),
     kind(
         "finePositioning",
-        Deed::FinePositioning,
+        Effect::FinePositioning,
         NODE_EDGE,
         STATION,
         "Aligns to a station",
@@ -265,29 +265,29 @@ const KINDS: [ActionKind; 20] = [
     .pausing(),
     kind(
         "waitForTrigger",
-        Deed::WaitForTrigger,
+        Effect::WaitForTrigger,
         NODE,
         &[required("triggerType", "STRING")],
         "Waits for the button on the vehicle",
     ),
-    kind("cancelOrder", Deed::CancelOrder, INSTANT, &[], "Gives the order up"),
+    kind("cancelOrder", Effect::CancelOrder, INSTANT, &[], "Gives the order up"),
     kind(
         "factsheetRequest",
-        Deed::FactsheetRequest,
+        Effect::FactsheetRequest,
         INSTANT,
         &[],
         "Sends the factsheet",
     ),
     kind(
         "warningLights",
-        Deed::WarningLights,
+        Effect::WarningLights,
         EDGE,
         &[],
         "Flashes as long as the vehicle is on the edge",
     ),
     kind(
         "beep",
-        Deed::Beep,
+        Effect::Beep,
         ALL,
         DURATION,
         "Sounds the horn, for `duration` seconds",
@@ -296,7 +296,7 @@ const KINDS: [ActionKind; 20] = [
     .taking_time(),
     kind(
         "calibrate",
-        Deed::Calibrate,
+        Effect::Calibrate,
         ALL,
         DURATION,
         "Calibrates sensors; cannot be interrupted",
@@ -310,9 +310,9 @@ pub(crate) fn offered(config: &AgvConfig) -> impl Iterator<Item = &'static Actio
 }
 
 fn is_offered(config: &AgvConfig, kind: &ActionKind) -> bool {
-    let in_version = match kind.deed {
-        Deed::EnableMap | Deed::DownloadMap | Deed::DeleteMap => config.has("mapActions"),
-        Deed::FactsheetRequest => config.has("factsheetRequest"),
+    let in_version = match kind.effect {
+        Effect::EnableMap | Effect::DownloadMap | Effect::DeleteMap => config.has("mapActions"),
+        Effect::FactsheetRequest => config.has("factsheetRequest"),
         _ => true,
     };
     in_version && !config.without_actions.contains(kind.name)
@@ -355,7 +355,7 @@ pub(crate) fn refusal(
     if negative("duration") || negative("height") {
         return Some(("duration".to_owned(), "parameter is negative"));
     }
-    if matches!(kind.deed, Deed::Pick | Deed::Drop) {
+    if matches!(kind.effect, Effect::Pick | Effect::Drop) {
         if request
             .parameter("height")
             .and_then(Value::as_f64)

@@ -1,6 +1,6 @@
 //! Action states and the life cycle of actions: triggering, blocking types, pause, end (section 6.11 and figure 16).
 //!
-//! Knows *when* an action starts and ends, not *what* it does (see `deeds`), nor what may run beside what (see
+//! Knows *when* an action starts and ends, not *what* it does (see `action_effect`), nor what may run beside what (see
 //! `blocking`). With the vehicle its actions are paused, which the two tables of section 6.8 say differently (the
 //! ruling of ACT-15).
 
@@ -49,7 +49,7 @@ impl Status {
     }
 }
 
-/// What asked for an action: an element of the order, by its sequenceId, or master control directly.
+/// Origin of an action: an element of the order, by its sequenceId, or master control directly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Origin {
     Node(u32),
@@ -68,7 +68,7 @@ pub(crate) struct Action {
     pub(crate) result: Option<String>,
     /// When the present stage ends; `None` if something else ends it.
     pub(crate) due: Option<Moment>,
-    /// What was left, and what it was, when it was held.
+    /// Status and remaining time when it was held.
     pub(crate) held: Option<(Status, Option<Duration>)>,
 }
 
@@ -205,7 +205,7 @@ impl Actions {
             .any(|action| action.of_order() && !action.status.is_terminal())
     }
 
-    /// What waits at a place, cut into parts that may run in parallel; a HARD action runs alone (BLOCK-05).
+    /// Actions that wait at a place, cut into parts that may run in parallel; a HARD action runs alone (BLOCK-05).
     pub(crate) fn phases(&self, origin: Origin) -> VecDeque<Vec<String>> {
         let waiting = |action: &&Action| action.origin == origin && action.status == Status::Waiting;
         let waiting: Vec<&Action> = self.all.iter().filter(waiting).collect();

@@ -5,8 +5,8 @@
 
 use super::Agv;
 use super::actions::{Action, List, Origin, Status};
+use super::hook_points::{Event, Permission};
 use super::order_message::Blocking;
-use super::points::{Event, Permission};
 
 impl Agv {
     /// A node was traversed, or an edge entered: its actions are triggered (NODE-04, NODE-06).

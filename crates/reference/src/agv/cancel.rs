@@ -5,28 +5,28 @@
 //! that cannot stop between nodes keeps the next node, and no edge (that of ORD-CANCEL-09).
 
 use super::Agv;
-use super::action_kinds::Deed;
+use super::action_kinds::Effect;
 use super::actions::{Action, Status};
-use super::book::Cancel;
 use super::errors::{ActiveError, Life};
-use super::points::{Event, Permission};
+use super::hook_points::{Event, Permission};
+use super::order_state::Cancel;
 
 impl Agv {
     /// A cancelOrder action begins.
     pub(crate) fn cancel_order(&mut self, action_id: &str) {
-        let active = !self.book.nodes.is_empty() || self.actions.order_unfinished();
-        if !active || self.book.cancel.is_some() || self.book.cancelled {
+        let active = !self.order.nodes.is_empty() || self.actions.order_unfinished();
+        if !active || self.order.cancel.is_some() || self.order.cancelled {
             self.nothing_to_cancel(action_id);
             return;
         }
-        let to_node = !self.config.stops_between_nodes && (self.book.entered || self.motion.reached);
+        let to_node = !self.config.stops_between_nodes && (self.order.entered || self.motion.reached);
         let to_node = self.allows(Permission::CancelAtNode, to_node);
         self.stop_actions();
         if to_node {
-            self.book.nodes.truncate(1);
-            self.book.edges.clear();
+            self.order.nodes.truncate(1);
+            self.order.edges.clear();
         }
-        self.book.cancel = Some(Cancel {
+        self.order.cancel = Some(Cancel {
             action_id: action_id.to_owned(),
             to_node,
         });
@@ -55,9 +55,9 @@ impl Agv {
 
     /// Ends the actions of the order, as far as they can be interrupted (ORD-CANCEL-03 to ORD-CANCEL-05).
     fn stop_actions(&mut self) {
-        let interruptible = |action: &Action| match action.kind.map(|kind| kind.deed) {
-            Some(Deed::WaitForTrigger) => true,
-            Some(Deed::Calibrate) => false,
+        let interruptible = |action: &Action| match action.kind.map(|kind| kind.effect) {
+            Some(Effect::WaitForTrigger) => true,
+            Some(Effect::Calibrate) => false,
             _ => self.config.interruptible,
         };
         let end = |action: &Action| {
@@ -82,10 +82,10 @@ impl Agv {
 
     /// Ends the cancellation once nothing moves or runs any more (ORD-CANCEL-07, ORD-CANCEL-11).
     pub(crate) fn settle_cancel(&mut self) -> bool {
-        let Some(cancel) = self.book.cancel.clone() else {
+        let Some(cancel) = self.order.cancel.clone() else {
             return false;
         };
-        let under_way = cancel.to_node && !self.book.nodes.is_empty() || self.motion.is_moving();
+        let under_way = cancel.to_node && !self.order.nodes.is_empty() || self.motion.is_moving();
         let under_way = self.allows(Permission::CancelAwaitsWay, under_way);
         let open = |action: &Action| action.of_order() && !action.status.is_terminal();
         let awaited = |action: &Action| open(action) && self.allows(Permission::CancelAwaits(action), true);
@@ -94,9 +94,9 @@ impl Agv {
             return false;
         }
         self.happens(Event::CancelEnding);
-        self.book.cancel = None;
-        self.book.cancelled = true;
-        self.book.drop_route();
+        self.order.cancel = None;
+        self.order.cancelled = true;
+        self.order.drop_route();
         if let Some(action) = self.actions.get_mut(&cancel.action_id) {
             action.end(Status::Finished);
         }
@@ -114,13 +114,13 @@ impl Agv {
             action.end(Status::Failed);
         }
         self.actions.drop_lists();
-        self.book.drop_route();
-        if let Some(cancel) = self.book.cancel.take()
+        self.order.drop_route();
+        if let Some(cancel) = self.order.cancel.take()
             && let Some(action) = self.actions.get_mut(&cancel.action_id)
         {
             action.end(Status::Finished);
         }
-        self.book.cancelled = self.book.has_order();
+        self.order.cancelled = self.order.has_order();
         self.happens(Event::GivenUp);
     }
 }

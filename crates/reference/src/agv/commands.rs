@@ -7,17 +7,17 @@ use serde_json::{Value, json};
 
 use crate::Output;
 
-use super::action_kinds::Deed;
+use super::action_kinds::Effect;
 use super::actions::Status;
-use super::book::Book;
 use super::errors::{ActiveError, Life};
+use super::hook_points::{Cause, Event, Permission};
 use super::motion::Pose;
-use super::points::{Cause, Event, Permission};
+use super::order_state::OrderState;
 use super::{Agv, Mode};
 
 /// The commands of [`crate::Input::Command`]; unknown ones are ignored.
 ///
-/// What each does and takes is said in [`tck_profile::VEHICLE_WORDS`].
+/// The effect and the arguments of each are described in [`tck_profile::VEHICLE_WORDS`].
 pub const COMMANDS: &[&str] = &[
     "power-cycle",
     "shutdown",
@@ -111,8 +111,8 @@ impl Agv {
         let moment = self.moment();
         self.motion.halt(moment);
         self.motion.reached = false;
-        let last_node = std::mem::take(&mut self.book.last_node);
-        self.book = Book::empty(last_node);
+        let last_node = std::mem::take(&mut self.order.last_node);
+        self.order = OrderState::empty(last_node);
         self.actions.clear();
         self.errors.clear();
         self.downloads.clear();
@@ -134,7 +134,7 @@ impl Agv {
         let waits = |action: &&super::actions::Action| {
             (wanted.is_empty() || action.request.id == wanted)
                 && action.status == Status::Running
-                && action.kind.is_some_and(|kind| kind.deed == Deed::WaitForTrigger)
+                && action.kind.is_some_and(|kind| kind.effect == Effect::WaitForTrigger)
         };
         let ids: Vec<String> = self
             .actions
@@ -170,7 +170,7 @@ impl Agv {
 
     /// Whether there is an order to be given up.
     pub(crate) fn is_occupied(&self) -> bool {
-        !self.book.nodes.is_empty() || self.actions.order_unfinished() || self.book.cancel.is_some()
+        !self.order.nodes.is_empty() || self.actions.order_unfinished() || self.order.cancel.is_some()
     }
 
     fn place_on(&mut self, node_id: &str) {
@@ -187,8 +187,8 @@ impl Agv {
             theta,
             map_id: node.map_id,
         });
-        self.book.last_node = node.id;
-        self.book.last_sequence = 0;
+        self.order.last_node = node.id;
+        self.order.last_sequence = 0;
         self.is_back();
     }
 

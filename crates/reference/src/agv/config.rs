@@ -106,7 +106,7 @@ impl Default for ErrorNames {
 }
 
 impl ErrorNames {
-    /// The names a vocabulary gives (`error.validation`, …), and the default where it gives none.
+    /// The names a vocabulary gives (such as `error.validation`), and the default where it gives none.
     #[must_use]
     pub fn from_vocabulary<'a>(word: impl Fn(&str) -> Option<&'a str>) -> Self {
         let mut names = Self::default();
@@ -161,21 +161,21 @@ pub struct AgvConfig {
     pub zone_set: Option<String>,
     /// Driving speed in metres per second. Acceleration is ignored.
     pub speed: f64,
-    /// How many times slower than usual it is for reasons of its own.
+    /// Factor by which it is slower than usual for reasons of its own.
     pub slowness: f64,
     /// Turning speed in radians per second.
     pub rotation_speed: f64,
     /// Height of the vehicle in metres, against edge.maxHeight.
     pub height: f64,
-    /// How far from a node the vehicle may stand and still be on it, in metres, where the order does not say.
+    /// Distance from a node at which the vehicle is still on it, in metres, where the order does not say.
     pub reach: f64,
-    /// The same for its orientation, in radians.
+    /// Difference in orientation at which the vehicle is still on a node, in radians.
     pub reach_theta: f64,
     /// A state is sent at the latest after this time (STATE-02).
     pub state_interval: Duration,
     /// No state is sent sooner after another than this (FACT-14).
     pub min_state_interval: Duration,
-    /// How long a message lies before it is looked at.
+    /// Time a message lies before it is looked at.
     pub answers_after: Duration,
     /// Interval of the visualization topic; off if `None`.
     pub visualization_interval: Option<Duration>,
@@ -183,9 +183,9 @@ pub struct AgvConfig {
     pub keep_alive: Duration,
     /// Time from a lost connection to the next attempt.
     pub reconnect_delay: Duration,
-    /// How long an action runs.
+    /// Time an action runs.
     pub action_duration: Duration,
-    /// How long actions of a type run, where it differs.
+    /// Time actions of a type run, where it differs.
     pub action_durations: BTreeMap<String, Duration>,
     /// Whether running actions end when their order is cancelled. `calibrate` never does, `waitForTrigger` always.
     pub interruptible: bool,
@@ -208,7 +208,7 @@ pub struct AgvConfig {
     pub maps: Vec<OnboardMap>,
     /// A download that has not ended by then has failed.
     pub download_timeout: Duration,
-    /// How long an error without a rule for its end stays.
+    /// Time an error without a rule for its end stays.
     pub error_duration: Duration,
     /// Largest number of nodes in an order, and in all its nodeStates.
     pub max_nodes: usize,
@@ -224,7 +224,7 @@ pub struct AgvConfig {
     pub load_positions: Vec<String>,
     /// Largest message in bytes.
     pub max_message: usize,
-    /// What is switched on at the seam, by name.
+    /// What is switched on at the hook points, by name.
     pub switched_on: Vec<&'static str>,
 }
 

@@ -12,7 +12,7 @@ use crate::{ConnectOptions, Output, Publication};
 use tck_base::clock::{Moment, Stamp};
 
 use super::Agv;
-use super::points::{Event, Head, Outgoing, Permission};
+use super::hook_points::{Event, Head, Outgoing, Permission};
 
 /// The state of the link, and what is counted over all connections.
 #[derive(Clone, Debug)]
@@ -24,7 +24,7 @@ pub(crate) struct Connection {
     pub(crate) shut_down: bool,
     /// It was online before.
     pub(crate) returning: bool,
-    /// How often it was online.
+    /// Number of times it was online.
     pub(crate) sessions: u32,
     /// The next headerId by topic name (HDR-02).
     pub(crate) header_ids: BTreeMap<&'static str, u32>,
@@ -98,7 +98,7 @@ impl Connection {
 }
 
 impl Agv {
-    /// How to connect: the will says CONNECTIONBROKEN (CONN-01 to CONN-04).
+    /// Options of the next connection: the will says CONNECTIONBROKEN (CONN-01 to CONN-04).
     pub(crate) fn options(&mut self, now: Stamp) -> ConnectOptions {
         self.now = now.at(now.moment.max(self.now.moment));
         let will = self.config.topic("connection").map(str::to_owned).map(|topic| {
@@ -124,7 +124,7 @@ impl Agv {
             will,
             subscriptions: topics.map(|topic| (topic, 0)).collect(),
         };
-        self.joining(&mut options);
+        self.connects(&mut options);
         options
     }
 
@@ -208,7 +208,7 @@ impl Agv {
             },
             periodic: name == "state" && self.report.periodic,
         };
-        if !self.publishes(&mut outgoing) {
+        if !self.sends(&mut outgoing) {
             return;
         }
         let message = std::mem::take(&mut outgoing.message);

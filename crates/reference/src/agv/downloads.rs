@@ -8,10 +8,10 @@ use std::collections::BTreeMap;
 use crate::{Download, Output};
 
 use super::Agv;
+use super::action_effect::{Outcome, Problem};
 use super::actions::Status;
-use super::deeds::{Outcome, Problem};
+use super::hook_points::{Event, Permission};
 use super::maps;
-use super::points::{Event, Permission};
 
 /// Downloads under way: actionId by token.
 #[derive(Clone, Debug, Default)]
@@ -109,7 +109,7 @@ impl Agv {
             self.downloads.forget(action_id);
             self.happens(Event::Downloaded);
             self.maps.store(action.text("mapId"), action.text("mapVersion"));
-            let outcome = self.turned_out(&action, Outcome::Done(None));
+            let outcome = self.ends(&action, Outcome::Done(None));
             self.conclude(action_id, outcome);
         }
     }
@@ -120,7 +120,7 @@ impl Agv {
         let Some(action) = self.actions.get(action_id).cloned() else {
             return;
         };
-        let outcome = self.turned_out(&action, Outcome::Failed(Problem::map(&action, reason)));
+        let outcome = self.ends(&action, Outcome::Failed(Problem::map(&action, reason)));
         self.conclude(action_id, outcome);
     }
 }

@@ -8,8 +8,8 @@ use super::ability::SLOWEST;
 use super::action_kinds::{self, ActionKind, MAX_HEIGHT};
 use super::config::LOAD_POSITIONS;
 use super::errors::MAX_ERRORS;
+use super::hook_points::Part;
 use super::path::{HALF_LENGTH, HALF_WIDTH};
-use super::points::Part;
 use super::read::MAX_STRING;
 use super::{Agv, AgvConfig};
 
@@ -31,7 +31,7 @@ const OPTIONAL_PARAMETERS: [&str; 14] = [
     "order.edges.length",
 ];
 
-/// The same for a vehicle that knows places by their names only.
+/// Optional parameters of a vehicle that knows places by their names only.
 const ON_A_LINE: [&str; 4] = [
     "order.nodes.nodeDescription",
     "order.edges.edgeDescription",
@@ -46,7 +46,7 @@ impl Agv {
         self.publish("factsheet", body);
     }
 
-    /// What it says about itself.
+    /// Factsheet of the vehicle as it is.
     pub(crate) fn true_factsheet(&self) -> Map<String, Value> {
         let Value::Object(mut body) = self.factsheet() else {
             return Map::new();

@@ -6,12 +6,12 @@
 use serde_json::Value;
 
 use super::Agv;
+use super::action_effect::Problem;
 use super::action_kinds::{self, ActionKind, Scope};
 use super::actions::{Action, Origin, Status};
-use super::deeds::Problem;
 use super::errors::{ActiveError, Life};
+use super::hook_points::{Cause, Event, Permission};
 use super::order_message::{ActionRequest, Blocking, read_parameters};
-use super::points::{Cause, Event, Permission};
 use super::read::{Defect, Fields};
 
 /// At most this many instant actions are remembered between two orders; the oldest that have ended give way.

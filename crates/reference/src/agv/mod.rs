@@ -3,40 +3,40 @@
 //! A message goes through it like this: `connection` receives nothing and sends everything; a driver hands in what came
 //! ([`Device::handle`]), and takes out what is to be sent. An order is read by `read` and `order_message`, decided in
 //! `acceptance` (figure 8), with `updates` for what continues an order, `ability` for what the vehicle can do and
-//! `rejection` for how it says no. `book` holds the order, `progress` drives it, leg by leg as `way` and `path` plan them,
-//! and `cancel` ends it (figure 9). `actions` knows when an action runs, `blocking` what may run beside it, `deeds`,
+//! `rejection` for how it says no. `order_state` holds the order, `progress` drives it, leg by leg as `way` and `path` plan them,
+//! and `cancel` ends it (figure 9). `actions` knows when an action runs, `blocking` what may run beside it, `action_effect`,
 //! `stations`, `maps` and `downloads` what it does. `instant` takes instant actions, `commands` what people do to the
 //! vehicle. `report` says all that in states, `factsheet` what the vehicle is.
 //!
-//! The vehicle asks at its points of decision whether it may, and says what happens: the words for both stand in `points`
-//! and `objections`, and `seam` is who else is asked. With nobody there the answer is what stands in the vehicle.
+//! The vehicle asks at its points of decision whether it may, and says what happens: the words for both stand in `hook_points`
+//! and `objections`, and `hooks` is who else is asked. With nobody there the answer is what stands in the vehicle.
 
 mod ability;
 mod acceptance;
+pub(crate) mod action_effect;
 pub(crate) mod action_kinds;
 pub(crate) mod actions;
 mod blocking;
-pub(crate) mod book;
 pub(crate) mod cancel;
 mod commands;
 pub(crate) mod config;
 pub(crate) mod connection;
-pub(crate) mod deeds;
 pub(crate) mod downloads;
 pub(crate) mod errors;
 mod factsheet;
+pub(crate) mod hook_points;
+pub(crate) mod hooks;
 pub(crate) mod instant;
 pub(crate) mod maps;
 pub(crate) mod motion;
 pub(crate) mod objections;
 pub(crate) mod order_message;
+pub(crate) mod order_state;
 pub(crate) mod path;
-pub(crate) mod points;
 pub(crate) mod progress;
 pub(crate) mod read;
 pub(crate) mod rejection;
 pub(crate) mod report;
-pub(crate) mod seam;
 mod stations;
 #[cfg(test)]
 mod tests;
@@ -52,14 +52,14 @@ pub use commands::COMMANDS;
 pub use config::{AgvConfig, ErrorNames, LayoutNode, OnboardMap};
 
 use actions::Actions;
-use book::Book;
 use connection::Connection;
 use downloads::Downloads;
 use errors::Errors;
+use hooks::SwitchedOn;
 use maps::Maps;
 use motion::{Motion, Pose};
+use order_state::OrderState;
 use report::Report;
-use seam::Seam;
 
 /// operatingMode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,7 +78,7 @@ impl Mode {
     }
 }
 
-/// What keeps the vehicle from moving.
+/// Reasons for which the vehicle does not move.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Holds {
     /// startPause.
@@ -112,12 +112,12 @@ pub(crate) struct Load {
 /// The reference AGV.
 #[derive(Debug)]
 pub struct Agv {
-    /// Who else is asked.
-    pub(crate) seam: Seam,
+    /// Hooks that are switched on.
+    pub(crate) hooks: SwitchedOn,
     pub(crate) config: AgvConfig,
     /// The time of what is happening.
     pub(crate) now: Stamp,
-    pub(crate) book: Book,
+    pub(crate) order: OrderState,
     pub(crate) motion: Motion,
     pub(crate) actions: Actions,
     pub(crate) maps: Maps,
@@ -130,7 +130,7 @@ pub struct Agv {
     pub(crate) obstacles: BTreeSet<String>,
     /// It has left its corridor and was not put back yet.
     pub(crate) strayed: bool,
-    /// Where loads are handed over, and whether one stands there.
+    /// Nodes where loads are handed over, and whether one stands there.
     pub(crate) stations: std::collections::BTreeMap<String, bool>,
     pub(crate) charging: bool,
     /// A switch keeps it from pausing and from going on.
@@ -139,7 +139,7 @@ pub struct Agv {
     pub(crate) charger_locked: bool,
     pub(crate) connection: Connection,
     pub(crate) report: Report,
-    /// What has come and was not looked at yet, and when it will be: messages, and what people do.
+    /// Messages and commands that were not looked at yet, and when they will be.
     pub(crate) inbox: VecDeque<(Moment, Input)>,
     /// It stands still until then.
     pub(crate) lingers_until: Option<Moment>,
@@ -147,7 +147,7 @@ pub struct Agv {
     pub(crate) states_sent: u64,
     /// Counts logs.
     pub(crate) logs: u32,
-    /// What was decided and is still to be handed to the driver.
+    /// Outputs that are still to be handed to the driver.
     pub(crate) pending: Vec<Output>,
 }
 
@@ -179,12 +179,12 @@ impl Agv {
         };
         let maps = Maps::new(config.maps.clone(), config.map_capacity);
         Self {
-            seam: Seam::default(),
+            hooks: SwitchedOn::default(),
             now: Stamp {
                 moment: Moment::START,
                 utc: jiff::Timestamp::UNIX_EPOCH,
             },
-            book: Book::empty(start),
+            order: OrderState::empty(start),
             motion: Motion::at(pose),
             actions: Actions::default(),
             maps,
@@ -253,7 +253,7 @@ impl Agv {
             self.stage_finished(&id);
         }
         self.errors.expire(moment);
-        self.happens(seam::Event::Woken);
+        self.happens(hooks::Event::Woken);
         self.lingers_until = self.lingers_until.filter(|until| *until > moment);
         while self.inbox.front().is_some_and(|(due, _)| *due <= moment) {
             match self.inbox.pop_front() {
@@ -264,7 +264,7 @@ impl Agv {
         }
         self.attempt_connection();
         self.settle();
-        self.happens(seam::Event::Settled);
+        self.happens(hooks::Event::Settled);
         self.flush();
     }
 }
@@ -298,7 +298,7 @@ impl Agv {
         let is_message = |input: &Input| matches!(input, Input::Message { .. });
         let mut due = self.moment() + self.config.answers_after;
         if is_message(&input) {
-            due = self.moment() + self.lasts(seam::Span::Answer, self.config.answers_after);
+            due = self.moment() + self.lasts(hooks::Span::Answer, self.config.answers_after);
             let before = self.inbox.iter().filter(|(_, other)| is_message(other));
             due = before.map(|(other, _)| *other).fold(due, Moment::max);
         }

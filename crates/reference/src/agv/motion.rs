@@ -25,7 +25,7 @@ impl Pose {
     }
 }
 
-/// An angle brought into -π … π.
+/// An angle brought into the range from -π to π.
 pub(crate) fn wrapped(angle: f64) -> f64 {
     let turned = angle.rem_euclid(2.0 * PI);
     if turned > PI { turned - 2.0 * PI } else { turned }
@@ -48,7 +48,7 @@ enum Leg {
     },
 }
 
-/// Where a vehicle looks while it follows a path.
+/// Orientation of a vehicle while it follows a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Facing {
     /// So much beside the direction of the path, in radians.

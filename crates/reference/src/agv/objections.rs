@@ -6,7 +6,7 @@ use super::action_kinds::ActionKind;
 use super::order_message::{ActionRequest, Node, Order};
 use super::read::Defect;
 
-/// What is wrong with an order.
+/// Objection against an order.
 #[derive(Clone, Copy)]
 pub(crate) enum Objection<'a> {
     /// Nodes and edges do not make a graph (ORD-11).
@@ -71,7 +71,7 @@ pub(crate) enum Lack<'a> {
     Parameter(&'a str),
 }
 
-/// Which of the rows of figure 8 an order is about.
+/// Relation of an order to the one the vehicle has, by the rows of figure 8.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Relation {
     /// It was received before.
@@ -84,7 +84,7 @@ pub(crate) enum Relation {
 
 /// An order that is taken over.
 pub(crate) struct Adoption<'a> {
-    /// What is taken over.
+    /// The order that is taken over.
     pub(crate) order: &'a mut Order,
     /// As it came.
     pub(crate) message: &'a Value,

@@ -14,7 +14,7 @@ const ANGLE: f64 = std::f64::consts::PI + 0.01;
 /// Coordinates beyond this are no place on earth, in metres.
 const FARTHEST: f64 = 1e8;
 
-/// What may go on beside an action (section 6.12).
+/// blockingType: what may go on beside an action (section 6.12).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Blocking {
     /// Driving and other actions.
@@ -206,7 +206,7 @@ pub(crate) struct Order {
     pub(crate) zone_set: Option<String>,
     /// Paths of optional fields that not every vehicle has a use for (OPT-02).
     pub(crate) unsupported: Vec<String>,
-    /// What is wrong with these fields, for a vehicle that has a use for them.
+    /// Defects of these fields, for a vehicle that has a use for them.
     pub(crate) defects: Vec<Defect>,
 }
 

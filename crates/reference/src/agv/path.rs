@@ -7,10 +7,10 @@
 use serde_json::{Value, json};
 
 use super::Agv;
-use super::book::{Place, Stop};
 use super::errors::{ActiveError, Life};
+use super::hook_points::{Cause, Event, Permission};
 use super::order_message::{Corridor, Edge, Node};
-use super::points::{Cause, Event, Permission};
+use super::order_state::{Place, Stop};
 use super::rejection::{Refusal, Rule};
 use tck_base::nurbs::Path;
 
@@ -52,7 +52,7 @@ impl Agv {
         let path = self.bends(edge, path)?;
         let pose = self.motion.pose(self.moment());
         let beside = path.beside(pose.x, pose.y)?;
-        let rest = if self.book.entered {
+        let rest = if self.order.entered {
             path.rest(beside.made)
         } else {
             path
@@ -91,10 +91,10 @@ impl Agv {
 
     /// Stops and reports when it is outside its corridor (CORR-06, CORR-07); whether it has found that just now.
     pub(crate) fn watch_corridor(&mut self) -> bool {
-        if self.holds.outside || self.strayed || !self.book.entered {
+        if self.holds.outside || self.strayed || !self.order.entered {
             return false;
         }
-        let Some(edge) = self.book.edge_ahead() else {
+        let Some(edge) = self.order.edge_ahead() else {
             return false;
         };
         let Some((corridor, trajectory)) = self.corridor(edge).zip(edge.trajectory.as_ref()) else {
@@ -131,7 +131,7 @@ impl Agv {
         let by = by.unwrap_or(PUSHED);
         let moment = self.moment();
         let mut pose = self.motion.pose(moment);
-        let ahead = self.book.nodes.front().map(|stop| &stop.place);
+        let ahead = self.order.nodes.front().map(|stop| &stop.place);
         let ahead = ahead.filter(|place| pose.distance(place.x, place.y) > ON_PATH);
         let heading = ahead.map_or(pose.theta, |place| (place.y - pose.y).atan2(place.x - pose.x));
         pose.x -= by * heading.sin();
@@ -146,7 +146,7 @@ impl Agv {
         self.set_holds(|holds| holds.outside = false);
     }
 
-    /// What is wrong with the trajectory or the direction of an edge for this vehicle.
+    /// Checks the trajectory or the direction of an edge for this vehicle.
     pub(crate) fn check_way(&self, edge: &Edge, ends: Option<(&Node, &Node)>) -> Result<(), Refusal> {
         let unable = |field: &str, reason: &str| {
             let path = format!("{}.{field}", edge.path);
@@ -186,7 +186,7 @@ impl Agv {
         told.next().map(|(.., end)| end.as_str())
     }
 
-    /// Where the vehicle gets to over an edge: a line-guided one to where the branch leads.
+    /// Place the vehicle gets to over an edge: a line-guided one to where the branch leads.
     pub(crate) fn arrives_at(&self, edge: Option<&Edge>, node: &Node) -> Option<Place> {
         let branch = edge.and_then(|edge| self.branch(&edge.start, edge.direction.as_deref()?));
         match branch.and_then(|end| self.config.node(end)) {
@@ -216,7 +216,7 @@ impl Agv {
             return Some(trajectory.sent.clone());
         }
         let stop = |sequence_id: u32| {
-            let nodes = self.book.left.0.iter().chain(&self.book.nodes);
+            let nodes = self.order.left.0.iter().chain(&self.order.nodes);
             let mut found = nodes.filter(|stop| stop.node.sequence_id == sequence_id);
             found.next().map(|stop| (stop.place.x, stop.place.y))
         };

@@ -7,11 +7,11 @@
 use std::f64::consts::PI;
 
 use super::Agv;
-use super::action_kinds::Deed;
+use super::action_kinds::Effect;
 use super::actions::Origin;
-use super::book::Stop;
+use super::hook_points::{Event, Hindrance, Permission};
 use super::order_message::Edge;
-use super::points::{Event, Hindrance, Permission};
+use super::order_state::Stop;
 use super::way::Course;
 use super::{motion, way};
 use tck_base::nurbs::Path;
@@ -54,9 +54,9 @@ impl Agv {
 
     /// Whether nothing forbids driving now.
     pub(crate) fn may_drive(&self) -> bool {
-        let cancelled = match &self.book.cancel {
+        let cancelled = match &self.order.cancel {
             Some(cancel) => !cancel.to_node,
-            None => self.book.cancelled,
+            None => self.order.cancelled,
         };
         let hindrances = [
             (Hindrance::Mode, !self.mode.takes_orders()),
@@ -70,7 +70,7 @@ impl Agv {
 
     /// The next node, if it may be driven to (ORD-07).
     pub(crate) fn next_stop(&self) -> Option<&Stop> {
-        let next = self.book.nodes.front();
+        let next = self.order.nodes.front();
         next.filter(|stop| self.allows(Permission::Enter, stop.node.released))
     }
 
@@ -95,7 +95,7 @@ impl Agv {
 
     /// Goes on towards the next node.
     fn set_out(&mut self, stop: &Stop) -> bool {
-        let edge = self.book.edge_ahead().cloned();
+        let edge = self.order.edge_ahead().cloned();
         let blocked = edge.as_ref().is_some_and(|edge| self.is_blocked(edge));
         if blocked || !self.allows(Permission::SetOut(stop), true) {
             return false;
@@ -111,11 +111,11 @@ impl Agv {
         let turns_before = edge.as_ref().is_some_and(|edge| edge.rotation_allowed == Some(false));
         let backwards = course.backwards;
         self.charging = false;
-        if !aligned && turns_before && !self.book.entered {
+        if !aligned && turns_before && !self.order.entered {
             self.turn_to(theta, edge.as_ref());
             return true;
         }
-        if let Some(edge) = edge.as_ref().filter(|_| !self.book.entered) {
+        if let Some(edge) = edge.as_ref().filter(|_| !self.order.entered) {
             self.enter(edge);
         }
         if distance < NOWHERE {
@@ -147,7 +147,7 @@ impl Agv {
 
     /// Enters an edge; its actions are triggered, at once if they do not stop the vehicle (NODE-06, NODE-07).
     fn enter(&mut self, edge: &Edge) {
-        self.book.entered = true;
+        self.order.entered = true;
         self.happens(Event::EdgeEntered(edge.sequence_id));
         if !self.stops_on_edge(edge.sequence_id) {
             self.trigger_actions(Origin::Edge(edge.sequence_id));
@@ -157,11 +157,11 @@ impl Agv {
 
     /// A leg has ended: on an edge with actions that stop the vehicle, they begin now.
     pub(crate) fn leg_finished(&mut self, rolled: bool) {
-        if !rolled || self.motion.reached || !self.book.entered {
+        if !rolled || self.motion.reached || !self.order.entered {
             return;
         }
         self.happens(Event::LegEnded);
-        let Some(sequence_id) = self.book.edge_ahead().map(|edge| edge.sequence_id) else {
+        let Some(sequence_id) = self.order.edge_ahead().map(|edge| edge.sequence_id) else {
             return;
         };
         if self.stops_on_edge(sequence_id) {
@@ -180,7 +180,7 @@ impl Agv {
                 None => self.config.reach_theta,
             };
             if motion::wrapped(theta - self.motion.pose(self.moment()).theta).abs() > allowed {
-                let edge = self.book.edge_ahead().cloned();
+                let edge = self.order.edge_ahead().cloned();
                 self.turn_to(theta, edge.as_ref());
                 return true;
             }
@@ -191,28 +191,28 @@ impl Agv {
 
     /// Reports a node traversed, leaves the edge, and triggers the node's actions (NODE-03, NODE-04, NODE-05).
     fn traverse(&mut self) {
-        let Some(stop) = self.book.nodes.pop_front() else {
+        let Some(stop) = self.order.nodes.pop_front() else {
             return;
         };
         let sequence_id = stop.node.sequence_id;
         self.motion.reached = false;
-        self.book.entered = false;
+        self.order.entered = false;
         let behind = |edge: &Edge| edge.sequence_id < sequence_id;
-        while self.book.edges.front().is_some_and(behind) {
-            if let Some(edge) = self.book.edges.pop_front() {
+        while self.order.edges.front().is_some_and(behind) {
+            if let Some(edge) = self.order.edges.pop_front() {
                 self.leave(edge);
             }
         }
         self.motion.set_map(stop.place.map_id.clone());
         self.happens(Event::NodeReached(sequence_id));
         if self.allows(Permission::Note(&stop), true) {
-            self.book.previous = (self.book.last_node.clone(), self.book.last_sequence);
-            self.book.last_node = self.mark_below().unwrap_or_else(|| stop.node.id.clone());
-            self.book.last_sequence = sequence_id;
+            self.order.previous = (self.order.last_node.clone(), self.order.last_sequence);
+            self.order.last_node = self.mark_below().unwrap_or_else(|| stop.node.id.clone());
+            self.order.last_sequence = sequence_id;
         }
-        self.book.left.0 = Some(stop);
+        self.order.left.0 = Some(stop);
         self.happens(Event::NodeNoted(sequence_id));
-        if self.book.cancel.is_none() {
+        if self.order.cancel.is_none() {
             self.trigger_actions(Origin::Node(sequence_id));
         }
         self.happens(Event::NodePassed(sequence_id));
@@ -224,22 +224,22 @@ impl Agv {
         if self.allows(Permission::LeaveEdge, true) {
             self.end_edge_actions(sequence_id);
         }
-        self.book.left.1 = Some(edge);
+        self.order.left.1 = Some(edge);
         self.happens(Event::EdgeLeft(sequence_id));
     }
 
     /// Whether the warning lights are on: as long as it is on the edge (ACT-03).
     pub(crate) fn is_flashing(&self) -> bool {
-        self.is_at(&[Deed::WarningLights])
+        self.is_at(&[Effect::WarningLights])
     }
 
     /// Whether the vehicle is lifting.
     pub(crate) fn is_lifting(&self) -> bool {
-        self.is_at(&[Deed::Pick, Deed::Drop])
+        self.is_at(&[Effect::Pick, Effect::Drop])
     }
 
-    fn is_at(&self, deeds: &[Deed]) -> bool {
+    fn is_at(&self, effects: &[Effect]) -> bool {
         let mut active = self.actions.iter().filter(|action| action.status.is_active());
-        active.any(|action| action.kind.is_some_and(|kind| deeds.contains(&kind.deed)))
+        active.any(|action| action.kind.is_some_and(|kind| effects.contains(&kind.effect)))
     }
 }

@@ -8,12 +8,12 @@ use serde_json::{Map, Value};
 /// Longest id or keyword the vehicle takes, in characters.
 pub(crate) const MAX_STRING: usize = 256;
 
-/// What is wrong with a message, and where.
+/// A defect of a message, and where it is.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Defect {
     /// Path of the field, such as `nodes[1].released`.
     pub(crate) path: String,
-    /// What is wrong with it.
+    /// Description of the defect.
     pub(crate) reason: &'static str,
 }
 

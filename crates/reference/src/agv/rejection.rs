@@ -9,7 +9,7 @@ use super::Agv;
 use super::errors::{ActiveError, Life};
 use super::read::Defect;
 
-/// Which rule refused an order.
+/// Rule by which an order is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Rule {
     Malformed,
@@ -62,7 +62,7 @@ impl From<Defect> for Refusal {
 impl Agv {
     /// Reports a refusal; nothing else changes (ORD-FLOW-12).
     pub(crate) fn refuse(&mut self, message: &Value, refusal: Refusal) {
-        self.refusing(message, refusal.rule);
+        self.refuses(message, refusal.rule);
         let names = &self.config.errors;
         let name = match refusal.rule {
             Rule::Malformed => &names.validation,

@@ -15,9 +15,9 @@ use serde_json::{Map, Value};
 use tck_base::clock::Moment;
 
 use super::Agv;
-use super::points::{Event, Part, Permission, Span};
+use super::hook_points::{Event, Part, Permission, Span};
 
-/// What has been reported.
+/// State reporting: what has been reported, and when the next state is due.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Report {
     /// An order message arrived (STATE-03).
@@ -47,7 +47,7 @@ impl Report {
 /// Members that change without being an event.
 const SILENT: [&str; 4] = ["agvPosition", "velocity", "batteryState", "distanceSinceLastNode"];
 
-/// What differs between two states.
+/// Differences between two states.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Changes {
     /// An order came (STATE-03).

@@ -5,17 +5,17 @@
 
 use serde_json::Value;
 
+use super::action_effect::{Area, Outcome, Problem};
 use super::actions::{Action, Origin};
 use super::config::LOAD_POSITIONS;
-use super::deeds::{Area, Outcome, Problem};
 use super::{Agv, Load};
 
 impl Agv {
     /// The node where an action takes place: on an edge the one it leads to.
     pub(crate) fn site(&self, action: &Action) -> String {
-        let ahead = self.book.nodes.front().map(|stop| &stop.node.id);
+        let ahead = self.order.nodes.front().map(|stop| &stop.node.id);
         let ahead = ahead.filter(|_| matches!(action.origin, Origin::Edge(_)));
-        ahead.unwrap_or(&self.book.last_node).clone()
+        ahead.unwrap_or(&self.order.last_node).clone()
     }
 
     /// A load or a charger is an object (ACT-35).
@@ -82,7 +82,7 @@ impl Agv {
         Ok(())
     }
 
-    /// What does not charge has nothing to end (ACT-11); what cannot be ended has failed (ACT-20).
+    /// Ends charging. A vehicle that does not charge has nothing to end (ACT-11); what cannot be ended has failed (ACT-20).
     pub(crate) fn stop_charging(&mut self, action: &Action) -> Result<(), Problem> {
         if self.charging && self.charger_locked {
             return Err(Problem::new(
@@ -97,7 +97,7 @@ impl Agv {
 
     /// The charger is at a node: there is none where the vehicle drives (ACT-20).
     pub(crate) fn start_charging(&mut self, action: &Action) -> Result<(), Problem> {
-        if self.motion.is_moving() || !self.config.chargers.contains(&self.book.last_node) {
+        if self.motion.is_moving() || !self.config.chargers.contains(&self.order.last_node) {
             return Err(Problem::new(Area::Charging, action, "the vehicle is not at a charger"));
         }
         self.charging = true;

@@ -5,21 +5,21 @@
 
 use super::Agv;
 use super::actions::{Action, Origin};
+use super::hook_points::{Event, Permission};
 use super::objections::{Objection, Relation};
 use super::order_message::{Node, Order};
-use super::points::{Event, Permission};
 use super::rejection::{Refusal, Rule};
 
 impl Agv {
     /// Rows 8 and 10: whether the update continues the order. A running order is continued at its decision point
     /// (ORD-FLOW-08), a completed one where the vehicle is (ORD-FLOW-10).
     pub(crate) fn check_update(&self, order: &Order) -> Result<(), Refusal> {
-        let cancelled = self.book.cancel.is_some() || self.book.cancelled;
+        let cancelled = self.order.cancel.is_some() || self.order.cancelled;
         if cancelled {
             let refusal = Refusal::new(Rule::BrokenUpdate, "the order was cancelled");
             self.object(Objection::Cancelled, refusal)?;
         }
-        self.objects(order, Relation::Update)?;
+        self.objected(order, Relation::Update)?;
         let first = &order.nodes[0];
         if !self.joins(first) {
             let refusal = Refusal::new(Rule::BrokenUpdate, "the update does not continue the order");
@@ -30,11 +30,11 @@ impl Agv {
 
     /// Whether an update that begins with this node continues the order there is.
     pub(crate) fn joins(&self, first: &Node) -> bool {
-        let runs = self.is_busy() || self.book.cancelled;
+        let runs = self.is_busy() || self.order.cancelled;
         let joint = if runs {
-            (&self.book.base_end.0, self.book.base_end.1)
+            (&self.order.base_end.0, self.order.base_end.1)
         } else {
-            (&self.book.last_node, self.book.last_sequence)
+            (&self.order.last_node, self.order.last_sequence)
         };
         joint == (&first.id, first.sequence_id)
     }
@@ -44,14 +44,14 @@ impl Agv {
         if !self.allows(Permission::KeepHorizon(&order), false) {
             self.drop_horizon();
         }
-        self.book.update_id = order.update_id;
+        self.order.update_id = order.update_id;
         self.append(order.nodes.into_iter().skip(1).collect(), order.edges);
         self.happens(Event::Updated);
     }
 
     /// The horizon goes, and the actions that wait there (ORD-UPD-08 to ORD-UPD-10).
     fn drop_horizon(&mut self) {
-        let gone = self.book.drop_horizon();
+        let gone = self.order.drop_horizon();
         self.happens(Event::HorizonDropped);
         let of_horizon = |action: &&Action| match action.origin {
             Origin::Node(id) | Origin::Edge(id) => {

@@ -3,17 +3,17 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::book::Stop;
+use super::hook_points::Permission;
 use super::motion::Facing;
 use super::order_message::Edge;
-use super::points::Permission;
+use super::order_state::Stop;
 use super::{Agv, Mode, motion};
 use tck_base::nurbs::Path;
 
 /// How far onto an edge the vehicle rolls out before an action that stops it begins, in metres.
 const BRAKING: f64 = 0.3;
 
-/// Which way the vehicle drives to a node.
+/// Course of the vehicle to a node.
 pub(crate) struct Course<'a> {
     /// The edge, if it needs one.
     pub(crate) edge: Option<&'a Edge>,
@@ -21,7 +21,7 @@ pub(crate) struct Course<'a> {
     pub(crate) curved: bool,
     /// Straight to the node, in radians.
     pub(crate) straight: f64,
-    /// Where the way leads first, in radians.
+    /// Direction in which the way begins, in radians.
     pub(crate) heading: f64,
     /// It drives backwards.
     pub(crate) backwards: bool,
@@ -33,7 +33,7 @@ pub(crate) struct Leg<'a> {
     pub(crate) stop: &'a Stop,
     /// Metres to that node.
     pub(crate) distance: f64,
-    /// How many of them are driven.
+    /// Metres of it that are driven.
     pub(crate) way: f64,
     /// The node counts as reached then.
     pub(crate) to_node: bool,
@@ -43,7 +43,7 @@ pub(crate) struct Leg<'a> {
     pub(crate) own: f64,
     /// It drives backwards.
     pub(crate) backwards: bool,
-    /// Where it looks on a curve.
+    /// Orientation on a curve.
     pub(crate) facing: Facing,
 }
 

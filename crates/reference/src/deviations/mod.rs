@@ -1,15 +1,15 @@
-//! Everything a reference device can do otherwise than a conformant one: faults, lapses, liberties and personas.
+//! Everything a reference device can do otherwise than a conformant one: faults, lapses, tolerances and personas.
 //!
 //! A deviation is one record in one place ([`record`]), in the file of its topic below the folder of its role. It takes
-//! hold at the seam of its role only, and is called what it does. What most deviations change is what a message
-//! says; [`words`] makes that short.
+//! hold at the hook points of its role only, and is called what it does. What most deviations change is what a message
+//! says; [`json_edit`] makes that short.
 
 #[macro_use]
 mod records;
 pub mod agv;
+pub mod json_edit;
 pub mod master_control;
 pub mod personas;
 pub mod record;
-pub mod words;
 
 pub use record::{Kind, Record};

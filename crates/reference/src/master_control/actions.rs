@@ -5,7 +5,7 @@
 use serde_json::{Map, Value, json};
 
 use super::Site;
-use super::seam::{Made, Permission};
+use super::hooks::Permission;
 use super::seen::ActionOffer;
 use super::vehicle::Vehicle;
 
@@ -64,7 +64,7 @@ impl Site {
         self.made_action(vehicle, kind, given, false)
     }
 
-    /// The same for an instant action.
+    /// An action of an order or an instant action, with all parameters it needs, those handed over first.
     pub(crate) fn made_action(&mut self, vehicle: &Vehicle, kind: &str, given: &Value, instant: bool) -> Value {
         let offer = vehicle.offer(kind);
         let listed = offer.and_then(|offer| offer.action_parameters.as_deref());
@@ -98,7 +98,9 @@ impl Site {
             let list = parameters.into_iter();
             action["actionParameters"] = list.map(|(key, value)| json!({ "key": key, "value": value })).collect();
         }
-        self.makes(vehicle, Made::Action(&mut action, given, instant));
+        if let Value::Object(action) = &mut action {
+            self.makes(vehicle, action, given, instant);
+        }
         action
     }
 
@@ -123,7 +125,7 @@ impl Site {
 }
 
 impl Vehicle {
-    /// What the factsheet says about an action.
+    /// Entry of the factsheet about an action.
     pub(crate) fn offer(&self, kind: &str) -> Option<&ActionOffer> {
         self.factsheet.as_ref()?.actions.as_ref()?.get(kind)
     }

@@ -6,7 +6,7 @@
 use serde_json::Value;
 
 use super::Site;
-use super::seam::{Event, Permission};
+use super::hooks::{Event, Permission};
 use super::vehicle::{Cancel, Running, Transport, Vehicle};
 
 impl Site {
@@ -20,13 +20,13 @@ impl Site {
             return;
         }
         let mut sends = true;
-        self.happens(vehicle, Event::CallingOff(&mut then, &mut sends));
+        self.happens(vehicle, &mut Event::CallingOff(&mut then, &mut sends));
         if !sends {
             return;
         }
         if let Some(action_id) = self.instant(vehicle, "cancelOrder", &Value::Null) {
             vehicle.cancel = Some(Cancel { action_id, then });
-            self.happens(vehicle, Event::CalledOff);
+            self.happens(vehicle, &mut Event::CalledOff);
         }
     }
 
@@ -65,11 +65,11 @@ impl Site {
             // It could not be called off, and is driven to its end.
             vehicle.queue.extend(cancel.then);
         }
-        self.happens(vehicle, Event::CancelOver);
+        self.happens(vehicle, &mut Event::CancelOver);
     }
 
     /// An order is over.
     pub(super) fn end(&mut self, vehicle: &mut Vehicle, running: &Running, called_off: bool) {
-        self.happens(vehicle, Event::Ended(running, called_off));
+        self.happens(vehicle, &mut Event::Ended(running, called_off));
     }
 }

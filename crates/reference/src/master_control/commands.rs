@@ -47,7 +47,12 @@ impl MasterControl {
                 .is_none_or(|serial| *serial == vehicle.config.serial_number)
         };
         let index = self.fleet.iter().position(meant);
-        if !self.site.asked(&mut self.fleet, index, name, arguments) {
+        if !self.site.commanded(&mut self.fleet, name, arguments) {
+            return;
+        }
+        if let Some(vehicle) = index.and_then(|index| self.fleet.get_mut(index))
+            && !self.site.asked(vehicle, name, arguments)
+        {
             return;
         }
         match name {

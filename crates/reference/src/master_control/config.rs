@@ -95,7 +95,7 @@ pub struct MasterControlConfig {
     pub reconnect_delay: Duration,
     /// An order or action that is not seen in a state by then is sent again.
     pub resend_after: Duration,
-    /// How often it is sent again at most.
+    /// Number of times it is sent again at most.
     pub resend_limit: u32,
     /// A waitForTrigger that runs longer is called off.
     pub trigger_timeout: Duration,
@@ -103,7 +103,7 @@ pub struct MasterControlConfig {
     pub base_length: usize,
     /// Number of nodes shown behind the base.
     pub horizon_length: usize,
-    /// How long a message lies before it is looked at.
+    /// Time a message lies before it is looked at.
     pub answers_after: Duration,
     /// Battery charge in percent below which no new order is begun, unless the vehicle charges.
     pub low_battery: f64,

@@ -5,7 +5,7 @@
 use crate::{ConnectOptions, Output};
 use tck_base::clock::Moment;
 
-use super::seam::{Event, Joining};
+use super::hooks::Event;
 use super::vehicle::Vehicle;
 use super::{HEARD, MasterControl, Site};
 
@@ -19,7 +19,7 @@ pub(crate) struct Connection {
     shut_down: bool,
     /// It has stood before.
     pub(crate) returning: bool,
-    /// How often it was lost.
+    /// Number of times it was lost.
     pub(crate) losses: u32,
 }
 
@@ -38,7 +38,7 @@ impl Default for Connection {
 
 impl MasterControl {
     /// How to connect now.
-    pub(super) fn joining(&mut self) -> Joining {
+    pub(super) fn joining(&mut self) -> ConnectOptions {
         let config = &self.site.config;
         // Only where a vehicle says that it is gone, a message must not be lost.
         let subscription = |vehicle: &Vehicle, name: &str| {
@@ -47,19 +47,16 @@ impl MasterControl {
         };
         let vehicles = self.fleet.iter();
         let subscriptions = vehicles.flat_map(|vehicle| HEARD.iter().filter_map(|name| subscription(vehicle, name)));
-        let mut joining = Joining {
-            options: ConnectOptions {
-                level: 4,
-                client_id: config.name.clone(),
-                keep_alive: config.keep_alive,
-                clean_session: true,
-                will: None,
-                subscriptions: subscriptions.collect(),
-            },
-            retry: Some(config.reconnect_delay),
+        let mut options = ConnectOptions {
+            level: 4,
+            client_id: config.name.clone(),
+            keep_alive: config.keep_alive,
+            clean_session: true,
+            will: None,
+            subscriptions: subscriptions.collect(),
         };
-        self.site.joining(&self.fleet, &mut joining);
-        joining
+        self.site.connects(&self.fleet, &mut options);
+        options
     }
 
     /// The broker accepted. What was sent and not seen is given its time again.
@@ -73,7 +70,7 @@ impl MasterControl {
         for vehicle in &mut self.fleet {
             vehicle.give_time(now);
             vehicle.at(now);
-            self.site.happens(vehicle, Event::Connected(returning));
+            self.site.happens(vehicle, &mut Event::Connected(returning));
         }
     }
 
@@ -85,7 +82,7 @@ impl MasterControl {
         }
         self.site.connection.losses += 1;
         if self.site.connection.attempt_at.is_none() {
-            let retry = self.joining().retry;
+            let retry = self.site.retries(Some(self.site.config.reconnect_delay));
             self.site.connection.attempt_at = retry.map(|delay| self.site.now.moment + delay);
         }
     }

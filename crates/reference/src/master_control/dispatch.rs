@@ -5,8 +5,8 @@ use std::time::Duration;
 use serde_json::Value;
 
 use super::Site;
+use super::hooks::{Event, Measure, Occasion, Permission, Span};
 use super::order::Window;
-use super::seam::{Event, Measure, Occasion, Permission, Plan, Span};
 use super::vehicle::{Leg, Running, Stop, Transport, Vehicle};
 use tck_base::clock::Moment;
 
@@ -44,7 +44,7 @@ impl Site {
             transport,
             ..Running::default()
         };
-        self.happens(vehicle, Event::Planned(&mut running));
+        self.happens(vehicle, &mut Event::Planned(&mut running));
         let end = self.free_until(vehicle, &running, 0);
         let released = end.min(self.config.base_length.max(1).saturating_add(1));
         if released < 2 && running.stops.len() > 1 {
@@ -55,11 +55,11 @@ impl Site {
             released,
             end: end.min(released.saturating_add(self.config.horizon_length)),
         };
-        self.plans(vehicle, Plan::Window(&running, &mut window, end));
+        self.shows(vehicle, &running, &mut window, end);
         if !self.maps_ready(vehicle, &running, 0..released.max(window.released)) {
             return;
         }
-        self.happens(vehicle, Event::Begins(&mut running));
+        self.happens(vehicle, &mut Event::Begins(&mut running));
         vehicle.queue.pop_front();
         let Some((message, window)) = self.order_message(vehicle, &running, window) else {
             return;
@@ -68,7 +68,7 @@ impl Site {
         running.released = window.released;
         self.send_order(vehicle, &mut running, message);
         vehicle.running = Some(running);
-        self.happens(vehicle, Event::Begun);
+        self.happens(vehicle, &mut Event::Begun);
     }
 
     /// Publishes an order message and watches for it.
@@ -133,7 +133,7 @@ impl Site {
         let from = transport.from.as_ref().filter(|_| !transport.loaded);
         let (mut way, here) = self.begin_at(vehicle, from.unwrap_or(&transport.to), transport)?;
         self.lead(vehicle, &mut way, &here, transport)?;
-        self.plans(vehicle, Plan::Way(&mut way, transport, true));
+        self.plans(vehicle, &mut way, transport, true);
         (self.names_fit(vehicle, &way) && self.actions_fit(vehicle, &way)).then_some(way)
     }
 }

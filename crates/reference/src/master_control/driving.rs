@@ -4,8 +4,8 @@
 //! takes too long is called off (ACT-39).
 
 use super::Site;
+use super::hooks::{Event, Fate, Measure, Occasion, Permission};
 use super::order::Window;
-use super::seam::{Event, Fate, Measure, Occasion, Permission, Plan};
 use super::seen::State;
 use super::vehicle::{Running, Transport, Vehicle};
 
@@ -101,7 +101,7 @@ impl Site {
         running.sent_at = now;
         vehicle.last_order_at = Some(now);
         vehicle.at(self.lost_after(vehicle, now));
-        self.happens(vehicle, Event::Resending(running));
+        self.happens(vehicle, &mut Event::Resending(running));
         self.send(vehicle, "order", &running.message, true);
         true
     }
@@ -111,12 +111,12 @@ impl Site {
         if vehicle.state.is_none() || !self.allows(vehicle, Permission::Extend(running), true) {
             return;
         }
-        self.happens(vehicle, Event::Extending(running));
+        self.happens(vehicle, &mut Event::Extending(running));
         let Some(state) = &vehicle.state else { return };
         let reached = running.reached(Some(state));
         let ahead = running.released.saturating_sub(reached + 1);
         let asked = state.new_base_request == Some(true);
-        let asked = self.allows(vehicle, Permission::Heed(running), asked);
+        let asked = self.allows(vehicle, Permission::Heed, asked);
         let grows = self.allows(vehicle, Permission::Grow(running, ahead, asked), ahead <= 1 || asked);
         if !(grows || running.changed) {
             return;
@@ -131,7 +131,7 @@ impl Site {
         }
         let changed = running.changed;
         if let Some(due) = self.next_order_at(vehicle, Occasion::Update { changed, asked }) {
-            self.happens(vehicle, Event::Waits(running, target, free));
+            self.happens(vehicle, &mut Event::Waits(running, target, free));
             vehicle.at(due);
             return;
         }
@@ -144,15 +144,15 @@ impl Site {
             released,
             end: free.min(released.saturating_add(self.config.horizon_length)),
         };
-        self.plans(vehicle, Plan::Window(running, &mut window, free));
+        self.shows(vehicle, running, &mut window, free);
         let before = running.update_id;
         running.update_id += 1;
-        self.happens(vehicle, Event::Updating(running));
+        self.happens(vehicle, &mut Event::Updating(running));
         match self.order_message(vehicle, running, window) {
             Some((message, window)) if window.released > running.released || running.changed => {
                 running.released = window.released;
                 self.send_order(vehicle, running, message);
-                self.happens(vehicle, Event::Updated(running, asked));
+                self.happens(vehicle, &mut Event::Updated(running, asked));
             }
             _ => running.update_id = before,
         }
@@ -215,7 +215,7 @@ pub(crate) fn refusal<'a>(running: &Running, state: &'a State) -> Option<&'a str
     found.map(|error| error.error_type.as_str())
 }
 
-/// How far an accepted order is.
+/// Progress of an accepted order.
 pub(crate) fn progress(running: &Running, state: &State) -> Fate {
     let failed = has_failed(running, state);
     let reached = running.reached(Some(state)) + 1;

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::seam::{Event, Heard, Permission};
+use super::hooks::{Event, Heard, Permission};
 use super::seen::{Factsheet, Header, MAX_MESSAGE, State};
 use super::vehicle::{Presence, Vehicle};
 use super::{MasterControl, Site};
@@ -48,7 +48,7 @@ impl MasterControl {
             "factsheet" => {
                 vehicle.factsheet = Some(Factsheet::read(&message));
                 vehicle.missed = None;
-                self.site.happens(vehicle, Event::Factsheet);
+                self.site.happens(vehicle, &mut Event::Factsheet);
             }
             _ => return,
         }
@@ -80,12 +80,12 @@ impl Site {
         };
         let before = std::mem::replace(&mut vehicle.presence, presence);
         if presence == Presence::Away {
-            self.happens(vehicle, Event::Away(told == Some("CONNECTIONBROKEN"), before));
+            self.happens(vehicle, &mut Event::Away(told == Some("CONNECTIONBROKEN"), before));
         } else {
             if before != Presence::Online {
                 vehicle.give_time(self.now.moment);
             }
-            self.happens(vehicle, Event::Online(before));
+            self.happens(vehicle, &mut Event::Online(before));
         }
     }
 
@@ -100,7 +100,7 @@ impl Site {
         if back {
             vehicle.give_time(self.now.moment);
         }
-        self.happens(vehicle, Event::State(before.as_ref()));
+        self.happens(vehicle, &mut Event::State(before.as_ref()));
     }
 
     /// Asks for the factsheet once when none is there a while after the vehicle is.

@@ -5,7 +5,7 @@
 use serde_json::{Value, json};
 
 use super::Site;
-use super::seam::{Event, Measure, Permission};
+use super::hooks::{Event, Measure, Permission};
 use super::seen::ActionState;
 use super::vehicle::{Instant, MAX_INSTANT, Vehicle};
 
@@ -22,7 +22,7 @@ impl Site {
         self.instant_all_the_same(vehicle, kind, given)
     }
 
-    /// The same without regard to the order that is driven.
+    /// Queues an instant action without regard to the order that is driven.
     pub(crate) fn instant_all_the_same(&mut self, vehicle: &mut Vehicle, kind: &str, given: &Value) -> Option<String> {
         if !self.offers(vehicle, kind, "INSTANT") {
             return None;
@@ -107,7 +107,7 @@ impl Site {
             vehicle.at(due);
         }
         for id in lost {
-            self.happens(vehicle, Event::InstantLost(&id));
+            self.happens(vehicle, &mut Event::InstantLost(&id));
         }
     }
 }

@@ -44,7 +44,7 @@ impl MasterControlConfig {
         Some(way)
     }
 
-    /// The same without regard to blocked edges where there is no other way.
+    /// The shortest way between two nodes, over blocked edges where there is no other.
     pub(crate) fn any_way(&self, from: &str, to: &str, blocked: &BTreeSet<(String, String)>) -> Option<Vec<&SiteEdge>> {
         self.way(from, to, blocked)
             .or_else(|| self.way(from, to, &BTreeSet::new()))

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::Site;
 use super::config::SiteMap;
-use super::seam::{Event, Permission};
+use super::hooks::{Event, Permission};
 use super::vehicle::{MapJob, Running, Stage, Vehicle};
 
 /// More roll-outs than this are not under way at a vehicle.
@@ -22,7 +22,7 @@ impl Site {
             return;
         }
         let mut done = false;
-        self.happens(vehicle, Event::RollOut(&map, &mut done));
+        self.happens(vehicle, &mut Event::RollOut(&map, &mut done));
         if done {
             return;
         }
@@ -67,7 +67,7 @@ impl Site {
             };
             let mut next = None;
             let mut done = false;
-            self.happens(vehicle, Event::RolledOut(&mut job, finished, &mut next, &mut done));
+            self.happens(vehicle, &mut Event::RolledOut(&mut job, finished, &mut next, &mut done));
             let map = job.map.clone();
             match (job.stage, finished) {
                 _ if done => {}
@@ -94,7 +94,7 @@ impl Site {
                 && let Some(finished) = vehicle.ended(&action_id)
             {
                 // Not asked again on its own, even if the vehicle says it is done and shows no map.
-                self.happens(vehicle, Event::Enabled(&map_id, finished));
+                self.happens(vehicle, &mut Event::Enabled(&map_id, finished));
                 vehicle.enabling.insert(map_id, String::new());
             }
         }
@@ -182,7 +182,7 @@ impl Site {
             "lastNodeId": last.unwrap_or_default(),
         });
         let mut done = false;
-        self.happens(vehicle, Event::Placing(&mut given, &mut done));
+        self.happens(vehicle, &mut Event::Placing(&mut given, &mut done));
         if !done {
             self.instant(vehicle, "initPosition", &given);
         }

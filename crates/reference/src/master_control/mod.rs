@@ -8,7 +8,7 @@
 //! is not released yet, `cancel` calls an order off and waits for the end of that (6.6.3). `instant` sends instant
 //! actions (6.9), made in `actions` (6.8); `maps` rolls maps out (6.7). `connecting` is its link to the broker.
 //!
-//! `seam` is where it can be made to behave otherwise; this room knows nothing of how.
+//! `hooks` is where it can be made to behave otherwise; this room knows nothing of how.
 
 pub(crate) mod actions;
 mod cancel;
@@ -18,14 +18,14 @@ mod connecting;
 pub(crate) mod dispatch;
 pub(crate) mod driving;
 mod hearing;
+mod hook_points;
+pub(crate) mod hooks;
 pub(crate) mod instant;
 pub(crate) mod layout;
 pub(crate) mod maps;
 pub(crate) mod order;
-mod points;
 mod publish;
 pub(crate) mod rerouting;
-pub(crate) mod seam;
 pub(crate) mod seen;
 #[cfg(test)]
 pub(crate) mod tests;
@@ -42,17 +42,17 @@ pub use commands::COMMANDS;
 pub use config::{MasterControlConfig, SiteEdge, SiteMap, SiteNode, VehicleConfig};
 
 use connecting::Connection;
-use seam::{Event, Hook, Made, Measure, Permission, Seam};
+use hooks::{Event, Hook, Measure, Permission, SwitchedOn};
 use vehicle::Vehicle;
 
 /// More messages than this do not lie about unread.
 const MAX_INBOX: usize = 10_000;
 
-/// What all vehicles share.
+/// Everything that all vehicles share.
 #[derive(Debug)]
 pub(crate) struct Site {
     pub(crate) config: MasterControlConfig,
-    seam: Seam,
+    hooks: SwitchedOn,
     /// The time of what is happening.
     pub(crate) now: Stamp,
     pub(crate) connection: Connection,
@@ -60,7 +60,7 @@ pub(crate) struct Site {
     pub(crate) session: u64,
     /// Counts ids.
     pub(crate) ids: u64,
-    /// What was decided and is still to be handed to the driver.
+    /// Outputs that are still to be handed to the driver.
     pub(crate) pending: Vec<Output>,
 }
 
@@ -69,7 +69,7 @@ impl Site {
     pub(crate) fn next_id(&mut self, vehicle: &Vehicle, what: &str) -> String {
         self.ids += 1;
         let mut id = self.spelled(vehicle, what, self.ids);
-        self.makes(vehicle, Made::Id(what, &mut id));
+        self.names(vehicle, what, &mut id);
         id
     }
 
@@ -90,7 +90,7 @@ impl Site {
         }
     }
 
-    /// How long an id may be.
+    /// Largest number of characters of an id.
     pub(crate) fn longest_id(&self, vehicle: &Vehicle) -> usize {
         let limit = vehicle.factsheet.as_ref().and_then(|sheet| sheet.id_length);
         self.measures(vehicle, Measure::IdLength, limit.unwrap_or(usize::MAX))
@@ -107,7 +107,7 @@ impl Site {
         if !self.connection.online {
             return;
         }
-        self.happens(vehicle, Event::Looked);
+        self.happens(vehicle, &mut Event::Looked);
         self.miss_factsheet(vehicle);
         self.watch_instants(vehicle);
         self.watch_maps(vehicle);
@@ -146,11 +146,11 @@ impl MasterControl {
         Self::with(config, Vec::new())
     }
 
-    /// The same, made to behave otherwise at its seam.
+    /// A master control that behaves otherwise at its hook points.
     pub(crate) fn with(config: MasterControlConfig, hooks: Vec<Hook>) -> Self {
         let mut site = Site {
             config,
-            seam: Seam::default(),
+            hooks: SwitchedOn::default(),
             now: Stamp {
                 moment: Moment::START,
                 utc: jiff::Timestamp::UNIX_EPOCH,
@@ -180,7 +180,7 @@ impl MasterControl {
         }
     }
 
-    /// What it was told.
+    /// Its configuration.
     #[cfg(test)]
     pub(crate) fn config(&self) -> &MasterControlConfig {
         &self.site.config
@@ -218,7 +218,7 @@ impl MasterControl {
 impl Device for MasterControl {
     fn connect_options(&mut self, now: Stamp) -> ConnectOptions {
         self.advance(now);
-        self.joining().options
+        self.joining()
     }
 
     fn handle(&mut self, now: Stamp, input: Input, out: &mut Vec<Output>) {

@@ -6,11 +6,11 @@
 use serde_json::{Value, json};
 
 use super::Site;
+use super::hooks::{Field, Measure, Worded};
 use super::layout::distance;
-use super::seam::{Field, Made, Measure};
 use super::vehicle::{Leg, Running, Stop, Vehicle};
 
-/// Which part of a way a message holds.
+/// Part of a way that a message holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Window {
     /// Index of the first node.
@@ -86,7 +86,9 @@ impl Site {
         }
         message["nodes"] = Value::Array(nodes);
         message["edges"] = Value::Array(edges);
-        self.makes(vehicle, Made::Order(running, window, cut, &mut message));
+        if let Value::Object(message) = &mut message {
+            self.words(vehicle, &Worded { running, window, cut }, message);
+        }
         message
     }
 
@@ -201,7 +203,7 @@ impl Site {
             index,
             window,
         };
-        self.makes(vehicle, Made::Field(&field, &mut value));
+        self.fills(vehicle, &field, &mut value);
         value
     }
 }

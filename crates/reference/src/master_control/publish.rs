@@ -10,7 +10,7 @@ use crate::{Output, Publication};
 use tck_base::clock::Moment;
 
 use super::Site;
-use super::seam::{Outgoing, Span};
+use super::hooks::{Outgoing, Span};
 use super::vehicle::Vehicle;
 
 impl Site {
@@ -19,7 +19,7 @@ impl Site {
         self.send(vehicle, name, body, false);
     }
 
-    /// The same; `again` if it is an order that was lost.
+    /// Publishes a message with its header; `again` if it is an order that was lost.
     pub(crate) fn send(&mut self, vehicle: &mut Vehicle, name: &'static str, body: &Value, again: bool) {
         let Some(topic) = vehicle
             .topic(name)
@@ -38,7 +38,7 @@ impl Site {
             retain: false,
             again,
         };
-        if !self.publishes(vehicle, &mut outgoing) {
+        if !self.sends(vehicle, &mut outgoing) {
             return;
         }
         let payload = self.text(name, &Value::Object(outgoing.message));

@@ -6,10 +6,10 @@
 use super::Site;
 use super::dispatch::Way;
 use super::driving::again;
-use super::seam::{Event, Plan};
+use super::hooks::Event;
 use super::vehicle::{MAX_QUEUE, Running, Stop, Transport, Vehicle};
 
-/// How a transport gets another destination.
+/// Means by which a transport gets another destination.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Reroute {
     /// By another way behind the base.
@@ -48,7 +48,7 @@ impl Site {
             None if !running.refused => Reroute::ByUpdate,
             _ => Reroute::ByCancel,
         };
-        self.happens(vehicle, Event::Rerouting(&mut running, &mut how));
+        self.happens(vehicle, &mut Event::Rerouting(&mut running, &mut how));
         let led =
             how == Reroute::ByUpdate && !running.is_whole() && self.lead_on(vehicle, &mut running, transport.clone());
         vehicle.running = Some(running);
@@ -79,13 +79,13 @@ impl Site {
         };
         let led = self.config.node(&here).is_some() && self.lead(vehicle, &mut way, &here, &transport).is_some();
         if led {
-            self.plans(vehicle, Plan::Way(&mut way, &transport, false));
+            self.plans(vehicle, &mut way, &transport, false);
         }
         // What is done at the end of the base is fixed; more cannot be done there.
         if !led || way.stops.len() < 2 || !way.stops[0].actions.is_empty() || !self.names_fit(vehicle, &way) {
             let mut done = false;
             if led {
-                self.happens(vehicle, Event::NotLed(running, &mut way, &transport, &mut done));
+                self.happens(vehicle, &mut Event::NotLed(running, &mut way, &transport, &mut done));
             }
             return done;
         }
@@ -98,7 +98,7 @@ impl Site {
             ..transport
         };
         running.changed = true;
-        self.happens(vehicle, Event::Led(running));
+        self.happens(vehicle, &mut Event::Led(running));
         true
     }
 
@@ -113,7 +113,7 @@ impl Site {
         };
         let transport = again(running, vehicle.state.as_ref());
         let mut heeded = true;
-        self.happens(vehicle, Event::Closed(index, &mut heeded));
+        self.happens(vehicle, &mut Event::Closed(index, &mut heeded));
         if !heeded {
             return;
         }

@@ -79,7 +79,7 @@ pub(crate) struct Position {
     /// For logging and visualization only (INFO-03).
     #[serde(default)]
     pub(crate) localization_score: Option<f64>,
-    /// The same.
+    /// In metres, for logging and visualization only (INFO-03).
     #[serde(default)]
     pub(crate) deviation_range: Option<f64>,
 }
@@ -174,7 +174,7 @@ pub(crate) struct State {
 }
 
 impl State {
-    /// How far an action is.
+    /// Reported state of an action.
     pub(crate) fn action(&self, id: &str) -> Option<&ActionState> {
         self.action_states.iter().find(|action| action.action_id == id)
     }
@@ -329,7 +329,7 @@ impl Factsheet {
         }
     }
 
-    /// What the vehicle says to an optional parameter, such as `order.edges.maxSpeed`.
+    /// Support the factsheet states for an optional parameter, such as `order.edges.maxSpeed`.
     pub(crate) fn support(&self, parameter: &str) -> Option<&str> {
         self.optional.get(parameter).map(String::as_str)
     }

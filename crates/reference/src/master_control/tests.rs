@@ -190,7 +190,7 @@ impl Bench {
         self.now = self.now.at(end);
     }
 
-    /// What passed on a topic.
+    /// Messages that passed on a topic.
     pub(crate) fn seen(&self, name: &str) -> Vec<&Value> {
         let suffix = format!("/{name}");
         let passed = self.passed.iter().filter(|passed| passed.topic.ends_with(&suffix));

@@ -15,7 +15,7 @@ pub(super) const MAX_QUEUE: usize = 200;
 /// More instant actions than this do not wait for one vehicle.
 pub(super) const MAX_INSTANT: usize = 100;
 
-/// What the connection topic says.
+/// State of the connection of a vehicle, by its connection topic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Presence {
     #[default]
@@ -27,9 +27,9 @@ pub(crate) enum Presence {
 /// A transport somebody asked for.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Transport {
-    /// Where a load is picked.
+    /// Node where a load is picked.
     pub(crate) from: Option<String>,
-    /// Where it ends.
+    /// Node where it ends.
     pub(crate) to: String,
     pub(crate) load_type: Option<String>,
     /// An action to be performed at the destination.
@@ -37,7 +37,7 @@ pub(crate) struct Transport {
     pub(crate) parameters: Value,
     /// The load is picked already.
     pub(crate) loaded: bool,
-    /// How often it was begun.
+    /// Number of times it was begun.
     pub(crate) begun: u32,
     /// It is the rest of the transport before it, and falls with it.
     pub(crate) follows: bool,
@@ -169,7 +169,7 @@ impl Running {
 #[derive(Clone, Debug)]
 pub(crate) struct Cancel {
     pub(crate) action_id: String,
-    /// What is to be done instead.
+    /// Transport that is done instead.
     pub(crate) then: Option<Transport>,
 }
 
@@ -192,7 +192,7 @@ impl Instant {
     }
 }
 
-/// How far the roll-out of a map is.
+/// Stage of the roll-out of a map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stage {
     Download,

@@ -9,8 +9,8 @@ use serde_json::{Map, Value, json};
 use super::Site;
 use super::config::SiteNode;
 use super::dispatch::Way;
+use super::hooks::{Measure, Permission};
 use super::layout::distance;
-use super::seam::{Measure, Permission, Plan};
 use super::seen::Position;
 use super::vehicle::{Leg, Stop, Transport, Vehicle};
 
@@ -21,18 +21,18 @@ const EXACT: f64 = 0.05;
 /// A vehicle this near to an edge is on it.
 const BESIDE: f64 = 0.5;
 
-/// Where a vehicle is, as a new order sees it.
+/// Pose of a vehicle, as a new order sees it.
 #[derive(Clone, Debug)]
 pub(crate) struct Pose {
     /// The last node.
     pub(crate) node: String,
     /// The reported position, if there is one.
     pub(crate) position: Option<Position>,
-    /// How it stands there.
+    /// How the vehicle is taken to stand there.
     pub(crate) standing: Standing,
 }
 
-/// How a vehicle is taken to stand.
+/// Relation of a vehicle to the node it stands at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Standing {
     /// On the node it is near, or else between nodes.
@@ -59,7 +59,7 @@ impl Site {
             position: state.agv_position.clone(),
             standing: Standing::Near,
         };
-        self.plans(vehicle, Plan::Pose(&mut pose, transport));
+        self.stands(vehicle, &mut pose, transport);
         let last = self.config.node(&pose.node);
         let on = |node: &SiteNode, covers: Option<f64>| {
             let mut stop = Stop::from(node);
@@ -187,7 +187,7 @@ impl Site {
 
     fn extend(&mut self, vehicle: &mut Vehicle, way: &mut Way, from: &str, to: &str) -> Option<()> {
         let mut closed = vehicle.blocked.clone();
-        self.plans(vehicle, Plan::Route(from, to, &mut closed));
+        self.avoids(vehicle, from, to, &mut closed);
         for edge in self.config.any_way(from, to, &closed)? {
             way.legs.push(Leg::from(edge));
             way.stops.push(Stop::from(self.config.node(&edge.to)?));

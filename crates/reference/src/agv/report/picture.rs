@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 
 use crate::agv::action_kinds::MAX_HEIGHT;
 use crate::agv::actions::Action;
-use crate::agv::points::Part;
+use crate::agv::hook_points::Part;
 use crate::agv::{Agv, Load, Mode};
 
 impl Agv {
@@ -17,16 +17,16 @@ impl Agv {
         if self.config.has("maps") {
             set("maps", self.maps.picture());
         }
-        set("orderId", json!(self.book.order_id));
-        set("orderUpdateId", json!(self.book.update_id));
+        set("orderId", json!(self.order.order_id));
+        set("orderUpdateId", json!(self.order.update_id));
         if let Some(zones) = &self.config.zone_set {
             set("zoneSetId", json!(zones));
         }
         if self.config.line_guided() {
             set("distanceSinceLastNode", json!(self.distance_made()));
         }
-        set("lastNodeId", json!(self.book.last_node));
-        set("lastNodeSequenceId", json!(self.book.last_sequence));
+        set("lastNodeId", json!(self.order.last_node));
+        set("lastNodeSequenceId", json!(self.order.last_sequence));
         set("nodeStates", self.node_states());
         set("edgeStates", self.edge_states());
         if !self.config.line_guided() {
@@ -37,7 +37,7 @@ impl Agv {
         set("driving", json!(self.motion.is_moving()));
         let paused = self.holds.pause || self.holds.button || self.holds.emergency;
         set("paused", json!(paused));
-        set("newBaseRequest", json!(self.book.base_runs_low()));
+        set("newBaseRequest", json!(self.order.base_runs_low()));
         let actions = self.actions.iter();
         set(
             "actionStates",
@@ -64,7 +64,7 @@ impl Agv {
     /// Metres since the last node.
     fn distance_made(&self) -> f64 {
         let pose = self.motion.pose(self.moment());
-        let left = self.book.left.0.as_ref().filter(|_| self.book.entered);
+        let left = self.order.left.0.as_ref().filter(|_| self.order.entered);
         left.map_or(0.0, |stop| pose.distance(stop.place.x, stop.place.y))
     }
 
@@ -82,7 +82,7 @@ impl Agv {
 
     /// Whether there is nothing left but the horizon.
     pub(crate) fn waits_at_decision_point(&self) -> bool {
-        self.book.nodes.front().is_some_and(|stop| !stop.node.released)
+        self.order.nodes.front().is_some_and(|stop| !stop.node.released)
     }
 
     /// agvPosition, also for the visualization (STATE-MSG-05).

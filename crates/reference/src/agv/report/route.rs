@@ -5,20 +5,20 @@
 use serde_json::{Value, json};
 
 use crate::agv::Agv;
-use crate::agv::book::Stop;
+use crate::agv::hook_points::Part;
 use crate::agv::order_message::Edge;
-use crate::agv::points::Part;
+use crate::agv::order_state::Stop;
 
 impl Agv {
     /// nodeStates: what is still to be traversed, horizon included (STATE-12).
     pub(crate) fn node_states(&self) -> Value {
-        let ahead = self.book.nodes.iter();
+        let ahead = self.order.nodes.iter();
         ahead.filter_map(|stop| self.node_state(stop)).collect()
     }
 
     /// The node traversed last, as if it were still ahead.
     pub(crate) fn last_node_state(&self) -> Value {
-        let left = self.book.left.0.iter();
+        let left = self.order.left.0.iter();
         left.filter_map(|stop| self.node_state(stop)).collect()
     }
 
@@ -37,13 +37,13 @@ impl Agv {
 
     /// edgeStates: the same of edges.
     pub(crate) fn edge_states(&self) -> Value {
-        let ahead = self.book.edges.iter();
+        let ahead = self.order.edges.iter();
         ahead.filter_map(|edge| self.edge_state(edge)).collect()
     }
 
     /// The edge left last, as if it were still ahead.
     pub(crate) fn last_edge_state(&self) -> Value {
-        let left = self.book.left.1.iter();
+        let left = self.order.left.1.iter();
         left.filter_map(|edge| self.edge_state(edge)).collect()
     }
 

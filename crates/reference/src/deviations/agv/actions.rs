@@ -1,13 +1,6 @@
 //! Deviations of what a state says about actions (section 6.10.6).
 
-use super::hooks::{Object, action, state, text};
-use crate::agv::Agv;
-use crate::agv::action_kinds::Deed;
-use crate::agv::actions::{Action, Origin, Status};
-use crate::agv::seam::Deviation;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::{Value, json};
+use super::prelude::*;
 
 records! {
     fault "action-states-omitted-when-empty" ["STATE-MSG-01", "STATE-01"] "It leaves actionStates out of the state when there are none."
@@ -27,11 +20,11 @@ records! {
         });
     fault "far-actions-unlisted" ["ASTATE-01", "ORD-FLOW-06", "STATE-MSG-09"] "It lists the actions of a node or edge only once that node, or the node the edge leads to, is the next one."
         => action(|agv, action, _| {
-            let next = agv.book.nodes.front().map_or(u32::MAX, |stop| stop.node.sequence_id);
+            let next = agv.order.nodes.front().map_or(u32::MAX, |stop| stop.node.sequence_id);
             !is_behind(action, next)
         });
     fault "horizon-actions-missing" ["ASTATE-01"] "Lists the actions of the horizon only when they are released."
-        => action(|agv, action, _| !is_behind(action, agv.book.base_end.1));
+        => action(|agv, action, _| !is_behind(action, agv.order.base_end.1));
     fault "instant-action-unlisted" ["IACT-03", "STATE-MSG-09", "ORD-CANCEL-18"] "Performs instant actions without an action state."
         => action(|_, action, _| action.of_order());
     fault "failed-instant-unlisted" ["IACT-03", "STATE-MSG-09"] "It does not list instant actions that have failed."
@@ -39,7 +32,7 @@ records! {
     fault "edge-actions-unlisted" ["ASTATE-01"] "Lists the actions of an edge only when they begin."
         => action(|_, action, _| !matches!(action.origin, Origin::Edge(_)) || action.status != Status::Waiting);
     fault "single-node-action-unlisted" ["ASTATE-01"] "Does not list the actions of orders with one node."
-        => action(|agv, action, _| !action.of_order() || agv.book.base_end.1 != 0);
+        => action(|agv, action, _| !action.of_order() || agv.order.base_end.1 != 0);
 
     fault "running-from-start" ["ASTATE-02"] "Reports all actions RUNNING when the order is accepted."
         => action(|_, _, m| say(m, "WAITING", "RUNNING"));
@@ -47,12 +40,12 @@ records! {
         => action(|_, _, m| say(m, "WAITING", "INITIALIZING"));
     fault "pick-prepared-as-running" ["ACT-33", "ASTATE-02"] "Reports a pick RUNNING while it only prepares for it."
         => action(|_, action, m| {
-            let picks = action.kind.is_some_and(|kind| kind.deed == Deed::Pick);
+            let picks = action.kind.is_some_and(|kind| kind.effect == Effect::Pick);
             !picks || say(m, "WAITING", "RUNNING") && say(m, "INITIALIZING", "RUNNING")
         });
     fault "paused-without-pause" ["ASTATE-04"] "Reports actions PAUSED that only wait for others."
         => action(|agv, action, m| {
-            let waits_here = action.origin == Origin::Node(agv.book.last_sequence) && !agv.holds.any();
+            let waits_here = action.origin == Origin::Node(agv.order.last_sequence) && !agv.holds.any();
             !waits_here || say(m, "WAITING", "PAUSED")
         });
     fault "pause-marks-waiting-actions-paused" ["ASTATE-05", "ASTATE-02"] "It reports actions that are still WAITING for their node as PAUSED during a pause."
@@ -61,12 +54,12 @@ records! {
         => action(|agv, action, m| !is_next(agv, action) || say(m, "WAITING", "INITIALIZING"));
     fault "paused-at-decision-point" ["ASTATE-04", "ASTATE-02"] "While the vehicle waits at the decision point it reports the actions of its horizon PAUSED."
         => action(|agv, action, m| {
-            let held = is_behind(action, agv.book.base_end.1) && agv.waits_at_decision_point();
+            let held = is_behind(action, agv.order.base_end.1) && agv.waits_at_decision_point();
             !held || say(m, "WAITING", "PAUSED")
         });
     fault "cancel-shows-paused" ["ORD-CANCEL-05"] "An action that cannot be interrupted is reported PAUSED while the cancellation waits for it."
         because "ORD-CANCEL-05, that the action stays RUNNING, is a recommendation; PAUSED is a fault where it lasts though nothing holds the vehicle."
-        => action(|agv, action, m| !action.of_order() || agv.book.cancel.is_none() || say(m, "RUNNING", "PAUSED"));
+        => action(|agv, action, m| !action.of_order() || agv.order.cancel.is_none() || say(m, "RUNNING", "PAUSED"));
     fault "status-done" ["STATE-MSG-14", "ASTATE-05", "ACT-13"] "Says DONE where FINISHED is meant."
         => action(|_, _, m| say(m, "FINISHED", "DONE"));
     fault "initializing-spelled-british" ["STATE-MSG-14"] "It writes the actionStatus INITIALIZING as INITIALISING."
@@ -101,6 +94,6 @@ fn is_behind(action: &Action, sequence_id: u32) -> bool {
 
 /// Whether the vehicle is on its way to the node of this action.
 fn is_next(agv: &Agv, action: &Action) -> bool {
-    let next = agv.book.nodes.front().map(|stop| stop.node.sequence_id);
-    agv.book.entered && next.is_some_and(|next| action.origin == Origin::Node(next))
+    let next = agv.order.nodes.front().map(|stop| stop.node.sequence_id);
+    agv.order.entered && next.is_some_and(|next| action.origin == Origin::Node(next))
 }

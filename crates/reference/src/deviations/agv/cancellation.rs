@@ -1,112 +1,78 @@
 //! Deviations of how an order is cancelled (section 6.6.3 and figure 9).
 
-use super::hooks::MOMENT;
-use super::hooks::action;
-use super::hooks::allowing;
-use super::hooks::breaking;
-use super::hooks::brief;
-use super::hooks::forbidding;
-use super::hooks::goes_on;
-use super::hooks::instead;
-use super::hooks::is;
-use super::hooks::is_acting;
-use super::hooks::keep;
-use super::hooks::letting;
-use super::hooks::nothing_to_cancel;
-use super::hooks::plain;
-use super::hooks::since_update;
-use super::hooks::when;
-use crate::agv::Agv;
-use crate::agv::action_kinds::Deed;
-use crate::agv::actions::Action;
-use crate::agv::actions::Origin;
-use crate::agv::actions::Status;
-use crate::agv::book::Book;
-use crate::agv::book::Stop;
-use crate::agv::deeds::Outcome;
-use crate::agv::errors::ActiveError;
-use crate::agv::errors::Life;
-use crate::agv::order_message::Edge;
-use crate::agv::seam::Cause;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Hindrance;
-use crate::agv::seam::Permission;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use std::collections::VecDeque;
-use std::time::Duration;
-use tck_base::clock::Moment;
+use crate::agv::order_state::OrderState;
+
+use super::prelude::*;
 
 records! {
     fault "cancel-drives-on" ["ORD-CANCEL-02"] "Drives its base to the end before it obeys cancelOrder."
         => allowing(|agv, what, usual| match what {
-            Permission::DriveAgainst(Hindrance::Cancellation) => agv.book.cancel.is_some(),
-            Permission::CancelAwaitsWay => usual || agv.book.nodes.iter().any(|stop| stop.node.released),
+            Permission::DriveAgainst(Hindrance::Cancellation) => agv.order.cancel.is_some(),
+            Permission::CancelAwaitsWay => usual || agv.order.nodes.iter().any(|stop| stop.node.released),
             _ => usual,
         });
     fault "cancel-after-update-drives-on" ["ORD-CANCEL-02"] "It drives on to the end of its base after cancelOrder when the order has been updated before."
         => since_update().allows(|updated, agv, what, usual| match what {
-            Permission::DriveAgainst(Hindrance::Cancellation) => *updated && agv.book.cancel.is_some(),
-            Permission::CancelAwaitsWay if *updated && !agv.holds.any() => usual || agv.book.nodes.iter().any(|stop| stop.node.released),
+            Permission::DriveAgainst(Hindrance::Cancellation) => *updated && agv.order.cancel.is_some(),
+            Permission::CancelAwaitsWay if *updated && !agv.holds.any() => usual || agv.order.nodes.iter().any(|stop| stop.node.released),
             _ => usual,
         });
     fault "cancel-finished-moving" ["ORD-CANCEL-07"] "Reports cancelOrder FINISHED while it still rolls out."
         => allowing(|agv, what, usual| match what {
             Permission::DriveAgainst(Hindrance::Cancellation) => true,
-            Permission::CancelAwaitsWay => agv.book.cancel.as_ref().is_some_and(|cancel| cancel.to_node) && !agv.book.nodes.is_empty(),
+            Permission::CancelAwaitsWay => agv.order.cancel.as_ref().is_some_and(|cancel| cancel.to_node) && !agv.order.nodes.is_empty(),
             _ => usual,
         });
     fault "cancel-in-node-action-drives-to-next-node" ["ORD-CANCEL-02"] "It still drives to the next node when cancelOrder comes while it stands on a node with a running action."
         => letting(|agv, what| {
-            let stands = !agv.book.entered && !agv.motion.is_moving();
+            let stands = !agv.order.entered && !agv.motion.is_moving();
             matches!(what, Permission::CancelAtNode) && is_acting(agv) && goes_on(agv) && stands
         });
     fault "cancel-keeps-nodes" ["ORD-CANCEL-09"] "Keeps all node states while it drives to the node where it stops."
         => keep::<Option<(VecDeque<Stop>, VecDeque<Edge>)>>()
             .does(|route, agv, action| {
-                if is(action, Deed::CancelOrder) {
-                    *route = Some((agv.book.nodes.clone(), agv.book.edges.clone()));
+                if is(action, Effect::CancelOrder) {
+                    *route = Some((agv.order.nodes.clone(), agv.order.edges.clone()));
                 }
                 None
             })
             .happens(|route, agv, event| if event == Event::CancelBegun && let Some(route) = route.take() {
-                (agv.book.nodes, agv.book.edges) = route;
+                (agv.order.nodes, agv.order.edges) = route;
             })
             .allows(|_, agv, what, usual| match what {
                 Permission::CancelAwaitsWay => {
-                    let to_node = agv.book.cancel.as_ref().is_some_and(|cancel| cancel.to_node);
-                    to_node && agv.book.entered && !agv.book.nodes.is_empty() || agv.motion.is_moving()
+                    let to_node = agv.order.cancel.as_ref().is_some_and(|cancel| cancel.to_node);
+                    to_node && agv.order.entered && !agv.order.nodes.is_empty() || agv.motion.is_moving()
                 }
                 _ => usual,
             });
     fault "cancel-last-node-stale" ["ORD-CANCEL-10"] "Does not report the node where it stopped after a cancellation."
-        => forbidding(|agv, what| matches!(what, Permission::Note(_)) && agv.book.cancel.is_some());
+        => forbidding(|agv, what| matches!(what, Permission::Note(_)) && agv.order.cancel.is_some());
     fault "last-node-ahead-when-cancelled" ["STATE-MSG-04"] "Names the node ahead as its last one when it is stopped between two nodes."
-        => when(Event::CancelEnding, |agv| if let Some(ahead) = agv.book.nodes.front().filter(|_| agv.book.entered) {
-            (agv.book.last_node, agv.book.last_sequence) = (ahead.node.id.clone(), ahead.node.sequence_id);
+        => when(Event::CancelEnding, |agv| if let Some(ahead) = agv.order.nodes.front().filter(|_| agv.order.entered) {
+            (agv.order.last_node, agv.order.last_sequence) = (ahead.node.id.clone(), ahead.node.sequence_id);
         });
     fault "cancel-leaves-waiting" ["ORD-CANCEL-03", "ORD-CANCEL-13"] "Leaves the waiting actions of a cancelled order WAITING."
         => breaking(|_, action, usual| usual.filter(|_| action.status != Status::Waiting)).allows(|_, _, what, usual| usual && !matches!(what, Permission::CancelAwaits(_)));
     fault "cancel-leaves-horizon-waiting" ["ORD-CANCEL-03"] "It leaves the actions of the horizon WAITING when its order is cancelled."
         => breaking(|agv, action, usual| usual.filter(|_| action.status != Status::Waiting || !is_planned(agv, action))).allows(|_, agv, what, usual| match what {
             Permission::CancelAwaits(action) => usual && action.status != Status::Waiting,
-            Permission::Count(action) => usual && !(agv.book.cancelled && action.status == Status::Waiting),
+            Permission::Count(action) => usual && !(agv.order.cancelled && action.status == Status::Waiting),
             _ => usual,
         });
     fault "cancel-lets-run" ["ORD-CANCEL-04"] "Lets interruptible actions run to their end when the order is cancelled." because "It breaks a recommendation only."
-        => breaking(|_, action, usual| usual.filter(|_| action.status == Status::Waiting || is(action, Deed::WaitForTrigger)));
+        => breaking(|_, action, usual| usual.filter(|_| action.status == Status::Waiting || is(action, Effect::WaitForTrigger)));
     fault "trigger-holds-cancel" ["ACT-38", "ORD-CANCEL-07"] "A waitForTrigger goes on waiting when its order is cancelled, and the cancelOrder with it."
-        => breaking(|_, action, usual| usual.filter(|_| action.status == Status::Waiting || !is(action, Deed::WaitForTrigger)));
+        => breaking(|_, action, usual| usual.filter(|_| action.status == Status::Waiting || !is(action, Effect::WaitForTrigger)));
     fault "trigger-survives-cancel" ["ACT-38"] "Reports waitForTrigger FINISHED when its order is cancelled."
         => breaking(|_, action, usual| match action.status {
-            status if status.is_active() && is(action, Deed::WaitForTrigger) => usual.map(|_| Status::Finished),
+            status if status.is_active() && is(action, Effect::WaitForTrigger) => usual.map(|_| Status::Finished),
             _ => usual,
         });
     fault "cancelled-action-finished" ["ORD-CANCEL-04"] "It reports running actions that it breaks off for a cancellation as FINISHED."
         because "ORD-CANCEL-04 recommends FAILED; an action that is called off at its end may be FINISHED."
         => breaking(|_, action, usual| match action.status {
-            status if status.is_active() && !is(action, Deed::WaitForTrigger) => usual.map(|_| Status::Finished),
+            status if status.is_active() && !is(action, Effect::WaitForTrigger) => usual.map(|_| Status::Finished),
             _ => usual,
         });
     fault "cancel-finishes-horizon-actions" ["ORD-CANCEL-03", "ASTATE-05"] "When an order is cancelled, the waiting actions of its horizon are reported FINISHED."
@@ -129,14 +95,14 @@ records! {
         => surviving(|action| action.status == Status::Paused);
     fault "queued-actions-survive-cancel" ["ORD-CANCEL-03"] "Actions of the node where the vehicle stands that wait behind another one are performed after cancelOrder."
         => breaking(|agv, action, usual| {
-            let queued = action.status == Status::Waiting && action.origin == Origin::Node(agv.book.last_sequence);
+            let queued = action.status == Status::Waiting && action.origin == Origin::Node(agv.order.last_sequence);
             usual.filter(|_| !queued)
         })
         .allows(|_, _, what, usual| usual && !matches!(what, Permission::ForgetQueue));
     fault "cancel-drops-waiting" ["ORD-CANCEL-12", "ORD-CANCEL-03"] "cancelOrder removes the actions that have not begun from actionStates instead of reporting them FAILED."
         => keep::<Vec<String>>()
             .does(|waiting, agv, action| {
-                if is(action, Deed::CancelOrder) {
+                if is(action, Effect::CancelOrder) {
                     let unbegun = agv.actions.iter().filter(|action| action.of_order() && action.status == Status::Waiting);
                     *waiting = unbegun.map(Action::id).collect();
                 }
@@ -147,7 +113,7 @@ records! {
             });
     fault "cancel-fails-early" ["ORD-CANCEL-05"] "Reports an action FAILED on cancellation and FINISHED when it ends." because "It breaks a recommendation only."
         => action(|agv, action, m| {
-            if agv.book.cancel.is_some() && action.of_order() && action.status.is_active() {
+            if agv.order.cancel.is_some() && action.of_order() && action.status.is_active() {
                 m.set("actionStatus", "FAILED");
             }
             true
@@ -157,58 +123,58 @@ records! {
             .happens(|(), agv, event| if event == Event::CancelBegun { agv.flush() })
             .allows(|(), _, what, usual| usual && !matches!(what, Permission::CancelAwaits(_)));
     fault "cancel-not-running" ["ORD-CANCEL-06", "ASTATE-05"] "It reports cancelOrder WAITING instead of RUNNING as long as an action is still running."
-        => when(Event::CancelBegun, |agv| if let Some(cancel) = &agv.book.cancel && let Some(action) = agv.actions.get_mut(&cancel.action_id) {
+        => when(Event::CancelBegun, |agv| if let Some(cancel) = &agv.order.cancel && let Some(action) = agv.actions.get_mut(&cancel.action_id) {
             action.status = Status::Waiting;
         })
         .allows(|_, agv, what, usual| {
-            let under_way = agv.book.cancel.as_ref().map(|cancel| &cancel.action_id);
+            let under_way = agv.order.cancel.as_ref().map(|cancel| &cancel.action_id);
             usual && !matches!(what, Permission::BeginInstant(action) if Some(&action.request.id) == under_way)
         });
     fault "cancel-waits-for-pause" ["ORD-CANCEL-07"] "Does not finish cancelOrder as long as it is paused."
         => forbidding(|agv, what| matches!(what, Permission::EndCancel) && agv.holds.pause);
     fault "cancel-never-finished" ["ORD-CANCEL-07", "IACT-04"] "Leaves cancelOrder RUNNING for ever."
         => when(Event::Cancelled, |agv| {
-            let ended = agv.actions.iter_mut().filter(|action| is(action, Deed::CancelOrder) && action.status == Status::Finished);
+            let ended = agv.actions.iter_mut().filter(|action| is(action, Effect::CancelOrder) && action.status == Status::Finished);
             ended.for_each(|action| action.status = Status::Running);
         });
     fault "route-dropped-after-cancel-finished" ["ORD-CANCEL-11"] "It reports cancelOrder FINISHED in a state that still lists nodes and edges, and empties the lists in the next one."
         => when(Event::CancelEnding, |agv| {
-            if let Some(cancel) = &agv.book.cancel && let Some(action) = agv.actions.get_mut(&cancel.action_id) {
+            if let Some(cancel) = &agv.order.cancel && let Some(action) = agv.actions.get_mut(&cancel.action_id) {
                 action.end(Status::Finished);
             }
             agv.flush();
         });
     fault "cancel-keeps-current-edge" ["ORD-CANCEL-11", "STATE-13"] "Cancelled between two nodes, it keeps the edge it stands on in its edge states."
         => keep::<Option<Edge>>().happens(|edge, agv, event| match event {
-            Event::CancelEnding => *edge = agv.book.edges.front().filter(|_| agv.book.entered).cloned(),
-            Event::Cancelled => agv.book.edges.extend(edge.take()),
+            Event::CancelEnding => *edge = agv.order.edges.front().filter(|_| agv.order.entered).cloned(),
+            Event::Cancelled => agv.order.edges.extend(edge.take()),
             _ => {}
         });
     fault "cancel-leaves-nodes" ["ORD-CANCEL-11", "STATE-13"] "Keeps the node and edge states of a cancelled order."
-        => keep::<Option<Book>>()
+        => keep::<Option<OrderState>>()
             .happens(|before, agv, event| match event {
-                Event::CancelEnding => *before = Some(agv.book.clone()),
+                Event::CancelEnding => *before = Some(agv.order.clone()),
                 Event::Cancelled => if let Some(before) = before.take() {
-                    (agv.book.nodes, agv.book.edges, agv.book.entered) = (before.nodes, before.edges, before.entered);
+                    (agv.order.nodes, agv.order.edges, agv.order.entered) = (before.nodes, before.edges, before.entered);
                     if before.cancel.is_some_and(|cancel| cancel.to_node) {
                         // All that was left was this node.
-                        agv.book.nodes.extend(agv.book.left.0.clone());
+                        agv.order.nodes.extend(agv.order.left.0.clone());
                     }
                 },
                 _ => {}
             })
             .raises(|_, agv, cause, _| {
                 if matches!(cause, Cause::NothingToCancel) {
-                    agv.book.drop_route();
+                    agv.order.drop_route();
                 }
                 true
             });
     fault "cancel-clears-order-id" ["ORD-CANCEL-08", "STATE-MSG-02"] "Empties the orderId when the order is cancelled."
-        => when(Event::Cancelled, |agv| agv.book.order_id.clear());
+        => when(Event::Cancelled, |agv| agv.order.order_id.clear());
     fault "cancel-resets-update-id" ["ORD-CANCEL-08", "STATE-MSG-02"] "Sets the orderUpdateId back to 0 when the order is cancelled."
-        => when(Event::Cancelled, |agv| agv.book.update_id = 0);
+        => when(Event::Cancelled, |agv| agv.order.update_id = 0);
     fault "cancel-clears-last-node" ["STATE-MSG-04"] "Empties the lastNodeId when the order is cancelled."
-        => when(Event::Cancelled, |agv| agv.book.last_node.clear());
+        => when(Event::Cancelled, |agv| agv.order.last_node.clear());
     fault "cancel-clears-order-warnings" ["ORD-REJ-03", "ORD-REJ-08"] "It empties errors when cancelOrder is finished, so that a validationError or orderError ends before a new order is accepted."
         => when(Event::Cancelled, |agv| agv.errors.new_order());
     fault "cancel-forgets-load" ["STATE-MSG-06"] "Shows no load any more when its order is cancelled."
@@ -222,47 +188,47 @@ records! {
                 Event::Woken if due.take_if(|due| *due <= agv.moment()).is_some() => agv.actions.retain(|action| !action.of_order()),
                 _ => {}
             })
-            .due(|due| *due);
+            .due(|due, _| *due);
     fault "paused-order-survives-cancel" ["ORD-CANCEL-02"] "Goes on with an order that was cancelled in a pause when the pause ends."
-        => keep::<Option<Book>>()
+        => keep::<Option<OrderState>>()
             .does(|order, agv, action| {
-                if is(action, Deed::CancelOrder) && agv.holds.pause && has_order(agv) {
-                    *order = Some(agv.book.clone());
+                if is(action, Effect::CancelOrder) && agv.holds.pause && has_order(agv) {
+                    *order = Some(agv.order.clone());
                 }
                 None
             })
             .ends(|order, agv, action, outcome| {
-                if is(action, Deed::StopPause) && matches!(outcome, Outcome::Done(_)) && let Some(order) = order.take() {
-                    agv.book = order;
+                if is(action, Effect::StopPause) && matches!(outcome, Outcome::Done(_)) && let Some(order) = order.take() {
+                    agv.order = order;
                 }
                 outcome
             });
     fault "second-cancel-takes-over" ["ORD-CANCEL-07", "IACT-04"] "Forgets a cancelOrder that is under way when a second one comes."
-        => instead(Deed::CancelOrder, |agv, action| {
-            agv.book.cancel.as_mut()?.action_id.clone_from(&action.request.id);
+        => instead(Effect::CancelOrder, |agv, action| {
+            agv.order.cancel.as_mut()?.action_id.clone_from(&action.request.id);
             agv.actions.get_mut(&action.request.id)?.status = Status::Running;
             Some(Outcome::Open)
         });
     fault "cancel-at-decision-point-refused" ["ORD-CANCEL-07", "ORD-CANCEL-11"] "cancelOrder at the decision point is FAILED with noOrderToCancel because the base is done, and the horizon stays."
-        => instead(Deed::CancelOrder, |agv, action| {
+        => instead(Effect::CancelOrder, |agv, action| {
             let waits = agv.waits_at_decision_point() && !agv.motion.is_moving() && !is_acting(agv);
             waits.then(|| refuse(agv, action))
         });
     fault "cancel-of-acting-order-refused" ["ORD-CANCEL-07", "ORD-CANCEL-03"] "cancelOrder is FAILED with noOrderToCancel when all nodes are traversed, although an action of the order is still running."
-        => instead(Deed::CancelOrder, |agv, action| agv.book.nodes.is_empty().then(|| refuse(agv, action)));
+        => instead(Effect::CancelOrder, |agv, action| agv.order.nodes.is_empty().then(|| refuse(agv, action)));
     fault "completed-order-cancel-finished" ["ORD-CANCEL-18", "ORD-CANCEL-19"] "cancelOrder after a completed order is reported FINISHED and without an error."
-        => instead(Deed::CancelOrder, |agv, _| {
-            let complete = agv.book.has_order() && !has_order(agv) && !agv.book.cancelled;
+        => instead(Effect::CancelOrder, |agv, _| {
+            let complete = agv.order.has_order() && !has_order(agv) && !agv.order.cancelled;
             complete.then_some(Outcome::Done(None))
         });
     fault "idle-cancel-finished" ["ORD-CANCEL-18"] "Reports cancelOrder FINISHED although there is no order."
         => nothing_to_cancel(|agv, e| finished(agv, e));
     fault "second-cancel-finished" ["ORD-CANCEL-18"] "A cancelOrder after the order was cancelled already is reported FINISHED."
-        => nothing_to_cancel(|agv, e| !agv.book.cancelled || finished(agv, e));
-    liberty "second-cancel-ends-with-the-first" ["ORD-CANCEL-18", "ASTATE-05"] "It answers a second cancelOrder that comes while the first is RUNNING with RUNNING and lets both finish together."
+        => nothing_to_cancel(|agv, e| !agv.order.cancelled || finished(agv, e));
+    tolerance "second-cancel-ends-with-the-first" ["ORD-CANCEL-18", "ASTATE-05"] "It answers a second cancelOrder that comes while the first is RUNNING with RUNNING and lets both finish together."
         => keep::<Vec<String>>()
             .does(|others, agv, action| {
-                let under_way = is(action, Deed::CancelOrder) && agv.book.cancel.is_some();
+                let under_way = is(action, Effect::CancelOrder) && agv.order.cancel.is_some();
                 under_way.then(|| {
                     if let Some(other) = agv.actions.get_mut(&action.request.id) {
                         other.status = Status::Running;
@@ -278,7 +244,7 @@ records! {
                     }
                 }
             });
-    liberty "cancel-takes-time" ["ORD-CANCEL-07", "ACT-41"] "A cancelOrder is RUNNING for some tenths of a second also if it has nothing to wait for."
+    tolerance "cancel-takes-time" ["ORD-CANCEL-07", "ACT-41"] "A cancelOrder is RUNNING for some tenths of a second also if it has nothing to wait for."
         => keep::<Option<Moment>>()
             .happens(|until, agv, event| match event {
                 Event::CancelBegun => *until = Some(agv.moment() + Duration::from_millis(400)),
@@ -286,15 +252,15 @@ records! {
                 _ => {}
             })
             .allows(|until, _, what, usual| usual && !(matches!(what, Permission::EndCancel) && until.is_some()))
-            .due(|until| *until);
-    liberty "cancel-in-steps" ["ORD-CANCEL-06", "STATE-11"] "It reports cancelOrder RUNNING with all actions ended in a state of its own before it reports FINISHED."
+            .due(|until, _| *until);
+    tolerance "cancel-in-steps" ["ORD-CANCEL-06", "STATE-11"] "It reports cancelOrder RUNNING with all actions ended in a state of its own before it reports FINISHED."
         => when(Event::CancelBegun, Agv::flush);
-    liberty "idle-cancel-error-brief" ["ORD-CANCEL-19", "STATE-05"] "It reports noOrderToCancel in one state and takes it back at once."
+    tolerance "idle-cancel-error-brief" ["ORD-CANCEL-19", "STATE-05"] "It reports noOrderToCancel in one state and takes it back at once."
         => nothing_to_cancel(|agv, e| {
             e.life = Life::Until(agv.moment() + brief(agv));
             true
         });
-    liberty "no-order-warning-until-next-order" ["ORD-CANCEL-19", "ERR-01", "ERR-03"] "It keeps noOrderToCancel in its errors until it accepts a new order."
+    tolerance "no-order-warning-until-next-order" ["ORD-CANCEL-19", "ERR-01", "ERR-03"] "It keeps noOrderToCancel in its errors until it accepts a new order."
         => nothing_to_cancel(|_, e| {
             e.life = Life::UntilNewOrder;
             true
@@ -307,13 +273,13 @@ fn of_edge(action: &Action) -> bool {
 
 /// Whether anything is left of the order.
 fn has_order(agv: &Agv) -> bool {
-    !agv.book.nodes.is_empty() || agv.actions.order_unfinished()
+    !agv.order.nodes.is_empty() || agv.actions.order_unfinished()
 }
 
 /// Whether an action belongs to the horizon.
 fn is_planned(agv: &Agv, action: &Action) -> bool {
     match action.origin {
-        Origin::Node(id) | Origin::Edge(id) => id > agv.book.base_end.1,
+        Origin::Node(id) | Origin::Edge(id) => id > agv.order.base_end.1,
         Origin::Instant => false,
     }
 }
@@ -335,15 +301,7 @@ fn finished(agv: &mut Agv, error: &ActiveError) -> bool {
 
 /// Misses some actions when the order is cancelled.
 fn surviving(which: fn(&Action) -> bool) -> Box<dyn Deviation> {
-    struct Surviving(fn(&Action) -> bool);
-    impl Deviation for Surviving {
-        fn breaks(&self, _: &Agv, action: &Action, usual: Option<Status>) -> Option<Status> {
-            usual.filter(|_| !(self.0)(action))
-        }
-
-        fn allows(&self, _: &Agv, what: Permission<'_>, usual: bool) -> bool {
-            usual && !matches!(what, Permission::CancelAwaits(action) if (self.0)(action))
-        }
-    }
-    Box::new(Surviving(which))
+    holding(which)
+        .breaks(|which, _, action, usual| usual.filter(|_| !which(action)))
+        .allows(|which, _, what, usual| usual && !matches!(what, Permission::CancelAwaits(action) if which(action)))
 }

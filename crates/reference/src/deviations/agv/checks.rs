@@ -1,23 +1,6 @@
 //! Deviations of what is checked before an order is taken over (section 6.6.4, ORD-REJ-04 to ORD-REJ-16).
 
-use super::hooks::adopting;
-use super::hooks::keep;
-use super::hooks::letting;
-use super::hooks::objecting;
-use super::hooks::overlooking;
-use super::hooks::updating;
-use crate::agv::Agv;
-use crate::agv::action_kinds::Deed;
-use crate::agv::order_message::Order;
-use crate::agv::rejection::Refusal;
-use crate::agv::rejection::Rule;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Lack;
-use crate::agv::seam::Objection;
-use crate::agv::seam::Permission;
-use crate::agv::seam::Relation;
-use crate::deviations::record::Record;
+use super::prelude::*;
 
 records! {
     fault "graph-unchecked" ["ORD-11"] "Takes over orders whose releases and counts make no sense."
@@ -30,7 +13,7 @@ records! {
     fault "sequence-unchecked" ["ORD-11"] "Takes nodes and edges with doubled or missing sequenceIds." because "Gaps and repetitions of sequenceIds are for the master control to avoid; no vehicle has to refuse them."
         => overlooking(|_, what| matches!(what, Objection::Graph(_, defect) if defect.path.ends_with(".sequenceId")));
     fault "update-graph-unchecked" ["ORD-11"] "It checks node and edge counts and release flags only in new orders and adopts an update that breaks them."
-        => overlooking(|agv, what| matches!(what, Objection::Graph(order, _) if order.id == agv.book.order_id && !order.nodes.is_empty()));
+        => overlooking(|agv, what| matches!(what, Objection::Graph(order, _) if order.id == agv.order.order_id && !order.nodes.is_empty()));
     fault "split-base-taken" ["ORD-11"] "It takes an order whose base goes on behind an unreleased node."
         => overlooking(|_, what| matches!(what, Objection::Graph(_, defect) if defect.reason == "is true behind the horizon's begin"));
     fault "counts-checked-in-base-only" ["ORD-11"] "It checks the number of edges against the number of nodes in the base only, so that an order with an edge missing in the horizon is accepted."
@@ -44,11 +27,11 @@ records! {
     fault "scope-unchecked" ["ACT-10"] "Performs actions of an order that are only for instantActions."
         => overlooking(|_, what| matches!(what, Objection::Action(_, Lack::Scope(_))));
     fault "requests-on-nodes-taken" ["ACT-10"] "stateRequest, factsheetRequest and logReport are performed as node and edge actions."
-        => overlooking(|_, what| matches!(what, Objection::Action(_, Lack::Scope(kind)) if matches!(kind.deed, Deed::StateRequest | Deed::FactsheetRequest | Deed::LogReport)));
+        => overlooking(|_, what| matches!(what, Objection::Action(_, Lack::Scope(kind)) if matches!(kind.effect, Effect::StateRequest | Effect::FactsheetRequest | Effect::LogReport)));
     fault "edge-scope-not-checked" ["ACT-10"] "It takes over an order with waitForTrigger on an edge, because it checks the scope of node actions only."
         => overlooking(|_, what| matches!(what, Objection::Action(asked, Lack::Scope(_)) if asked.of_edge));
     fault "charging-on-edge-accepted" ["ACT-10"] "It accepts startCharging as an edge action."
-        => overlooking(|_, what| matches!(what, Objection::Action(asked, Lack::Scope(kind)) if asked.of_edge && kind.deed == Deed::StartCharging));
+        => overlooking(|_, what| matches!(what, Objection::Action(asked, Lack::Scope(kind)) if asked.of_edge && kind.effect == Effect::StartCharging));
     fault "update-actions-not-checked" ["ORD-REJ-04", "ORD-REJ-09"] "It checks the actions of a new order but takes over an order update with an action that it cannot perform and later reports it FAILED."
         => overlooking(|_, what| matches!(what, Objection::Action(asked, _) if asked.update));
     fault "horizon-actions-unchecked" ["ORD-REJ-04", "ORD-REJ-09"] "An order is taken over although an action in its horizon cannot be performed."
@@ -126,7 +109,7 @@ records! {
                     agv.motion.set_map(map.clone());
                 }
             });
-    liberty "altered-joint-rejected" ["ORD-UPD-07"] "It rejects an update whose stitching node has an action that it did not have before."
+    tolerance "altered-joint-rejected" ["ORD-UPD-07"] "It rejects an update whose stitching node has an action that it did not have before."
         => objecting(|agv, order, relation| {
             let first = &order.nodes[0];
             let mut actions = first.actions.iter().filter(|_| relation == Relation::Update && agv.joins(first));

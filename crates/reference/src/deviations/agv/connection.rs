@@ -1,13 +1,8 @@
 //! Deviations of the link: how it is made, lost and left, and what the connection topic says (sections 6.3 and 6.14).
 
-use super::hooks::{joining, plain, sending, unsaid, when, will};
 use crate::ConnectOptions;
-use crate::agv::Agv;
-use crate::agv::actions::{Origin, Status};
-use crate::agv::seam::{Deviation, Event, Outgoing, Permission};
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use std::time::Duration;
+
+use super::prelude::*;
 
 records! {
     fault "old-mqtt" ["MQTT-01"] "Connects with MQTT 3.1."
@@ -79,7 +74,7 @@ records! {
     fault "warnings-gone-by-reconnect" ["ERR-01", "ORD-REJ-03", "ORD-REJ-08"] "It forgets all active errors when it reconnects, though no new order was accepted and nothing was put right."
         => when(Event::Connected, |agv| if agv.connection.sessions > 1 { agv.errors.clear() });
     fault "node-actions-repeated-after-reconnect" ["ASTATE-06", "MQTT-03"] "After a reconnect in the middle of an order the vehicle sets the finished actions of the node it stands at or left last back to WAITING and performs them again."
-        => when(Event::Connected, |agv| if agv.connection.sessions > 1 && agv.is_busy() { agv.repeat_actions(agv.book.last_sequence) });
+        => when(Event::Connected, |agv| if agv.connection.sessions > 1 && agv.is_busy() { agv.repeat_actions(agv.order.last_sequence) });
     fault "reconnect-loses-downloaded-maps" ["MAP-31", "MAP-15"] "It reports only its factory maps after a reconnect; downloaded maps are gone without deleteMap."
         => when(Event::Connected, |agv| if agv.connection.sessions > 1 {
             let factory = agv.config.maps.iter().map(|map| (&map.map_id, &map.map_version)).collect::<Vec<_>>();
@@ -90,10 +85,10 @@ records! {
     fault "order-forgotten-on-link-loss" ["MQTT-03", "STATE-MSG-02"] "Throws its order away when the link breaks."
         => when(Event::ConnectionLost, |agv| {
             agv.give_up_order();
-            agv.book.order_id.clear();
+            agv.order.order_id.clear();
         });
     fault "update-forgotten-on-link-loss" ["MQTT-03", "STATE-12", "STATE-MSG-13"] "Goes back to the first orderUpdateId of its order when the link breaks."
-        => when(Event::ConnectionLost, |agv| agv.book.update_id = 0);
+        => when(Event::ConnectionLost, |agv| agv.order.update_id = 0);
     fault "actions-forgotten-on-link-loss" ["MQTT-03", "STATE-MSG-10"] "Forgets the actions of its order when the link breaks."
         => when(Event::ConnectionLost, |agv| agv.actions.retain(|action| !action.of_order()));
     fault "ended-actions-lost-with-link" ["STATE-MSG-10", "MQTT-03", "STATE-MSG-09"] "After a broken link its states do not list the actions that had ended before."
@@ -105,7 +100,7 @@ records! {
         });
     fault "horizon-lost-with-link" ["MQTT-03", "MQTT-05", "STATE-12"] "When the link breaks it keeps the base of its order and throws the horizon away."
         => when(Event::ConnectionLost, |agv| {
-            let gone = agv.book.drop_horizon();
+            let gone = agv.order.drop_horizon();
             agv.actions.retain(|action| match action.origin {
                 Origin::Node(id) | Origin::Edge(id) => !gone.contains(&id),
                 Origin::Instant => true,
@@ -114,7 +109,7 @@ records! {
     fault "load-forgotten-with-link" ["STATE-MSG-06"] "After the link broke the vehicle reports no loads although it still carries one."
         => when(Event::ConnectionLost, |agv| agv.loads.clear());
     fault "cancelled-id-lost-with-link" ["ORD-CANCEL-08", "STATE-MSG-02"] "After a cancellation the orderId becomes empty as soon as the link breaks once."
-        => when(Event::ConnectionLost, |agv| if agv.book.cancelled { agv.book.order_id.clear() });
+        => when(Event::ConnectionLost, |agv| if agv.order.cancelled { agv.order.order_id.clear() });
     fault "pause-lost-on-link-loss" ["ACT-12", "ACT-13"] "Ends its pause when the link breaks."
         => when(Event::ConnectionLost, |agv| agv.set_holds(|holds| holds.pause = false));
 }

@@ -1,65 +1,23 @@
 //! Deviations of driving: setting out, the way over an edge, reaching a node (sections 6.6.1, 6.10.2 and 6.12).
 
-use super::hooks::Hooks;
-use super::hooks::MOMENT;
-use super::hooks::Object;
-use super::hooks::adopting;
-use super::hooks::edge;
-use super::hooks::facing;
-use super::hooks::forbidding;
-use super::hooks::goes_on;
-use super::hooks::holding;
-use super::hooks::is;
-use super::hooks::keep;
-use super::hooks::letting;
-use super::hooks::lifts_pause;
-use super::hooks::linger;
-use super::hooks::node;
-use super::hooks::number;
-use super::hooks::plain;
-use super::hooks::planning;
-use super::hooks::position;
-use super::hooks::raising;
-use super::hooks::steering;
-use super::hooks::velocity;
-use super::hooks::when;
-use crate::agv::Agv;
-use crate::agv::Mode;
-use crate::agv::action_kinds::Deed;
-use crate::agv::actions::Action;
-use crate::agv::actions::Origin;
-use crate::agv::actions::Status;
-use crate::agv::book::Stop;
-use crate::agv::deeds::Outcome;
-use crate::agv::motion;
+use std::f64::consts::{FRAC_PI_2, PI};
+
 use crate::agv::motion::Facing;
 use crate::agv::order_message::Corridor;
-use crate::agv::order_message::Edge;
-use crate::agv::seam::Cause;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Part;
-use crate::agv::seam::Permission;
 use crate::agv::way::is_backwards;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::Value;
-use serde_json::json;
-use std::collections::BTreeMap;
-use std::collections::BTreeSet;
-use std::f64::consts::FRAC_PI_2;
-use std::f64::consts::PI;
-use tck_base::clock::Moment;
+use crate::agv::{Mode, motion};
 use tck_base::nurbs::Path;
+
+use super::prelude::*;
 
 records! {
     fault "stops-on-link-loss" ["MQTT-04"] "Stands still as long as the link is down."
         => forbidding(|agv, what| matches!(what, Permission::Drive) && !agv.connection.online);
     fault "next-edge-not-entered-offline" ["MQTT-04"] "Without a link the vehicle ends the edge it is on and then stands on its next node, although more of its base is left."
-        => forbidding(|agv, what| matches!(what, Permission::SetOut(_)) && !agv.connection.online && !agv.book.entered && agv.book.edge_ahead().is_some());
+        => forbidding(|agv, what| matches!(what, Permission::SetOut(_)) && !agv.connection.online && !agv.order.entered && agv.order.edge_ahead().is_some());
     // Stranded between two nodes, it would be of no use for any further test.
     fault "stops-before-end-of-base" ["ORD-06"] "Stops one node before the end of the base."
-        => forbidding(|agv, what| matches!(what, Permission::SetOut(stop) if stop.node.sequence_id == agv.book.base_end.1 && agv.config.node(&agv.book.last_node).is_some()));
+        => forbidding(|agv, what| matches!(what, Permission::SetOut(stop) if stop.node.sequence_id == agv.order.base_end.1 && agv.config.node(&agv.order.last_node).is_some()));
     fault "horizon-driven" ["ORD-07", "ORD-UPD-01", "MQTT-05", "MQTT-04"] "Drives into the horizon without waiting for its release."
         => letting(|_, what| matches!(what, Permission::Enter));
     fault "horizon-driven-offline" ["MQTT-05", "ORD-07", "MQTT-04"] "Drives into the horizon while the link is down."
@@ -75,14 +33,14 @@ records! {
     fault "traversal-split" ["NODE-03"] "Removes the node state and updates the last node in two states." because "Two states of one moment are remarked on; tests that look at single states are not reached."
         => plain().happens(|(), agv, event| if matches!(event, Event::NodeReached(_)) { agv.flush() });
     fault "last-node-stale" ["NODE-03", "STATE-MSG-04", "STATE-06"] "Reports the new lastNodeId with the old lastNodeSequenceId."
-        => noted(|agv, _| agv.book.last_sequence = agv.book.previous.1);
+        => noted(|agv, _| agv.order.last_sequence = agv.order.previous.1);
     fault "last-sequence-of-old-order-kept" ["STATE-MSG-04", "NODE-03"] "It keeps the lastNodeSequenceId of the previous order when a new order begins at the node on which it already stands."
-        => noted(|agv, sequence_id| if sequence_id == 0 && agv.book.previous.0 == agv.book.last_node {
-            agv.book.last_sequence = agv.book.previous.1;
+        => noted(|agv, sequence_id| if sequence_id == 0 && agv.order.previous.0 == agv.order.last_node {
+            agv.order.last_sequence = agv.order.previous.1;
         });
     fault "loop-confused" ["ORD-UPD-13", "NODE-03"] "Reports the sequenceId of the first visit on every visit of a node."
         => keep::<BTreeMap<String, u32>>().happens(|visits, agv, event| match event {
-            Event::NodeNoted(sequence_id) => agv.book.last_sequence = *visits.entry(agv.book.last_node.clone()).or_insert(sequence_id),
+            Event::NodeNoted(sequence_id) => agv.order.last_sequence = *visits.entry(agv.order.last_node.clone()).or_insert(sequence_id),
             Event::Begun => visits.clear(),
             _ => {}
         });
@@ -90,8 +48,8 @@ records! {
         => keep::<BTreeSet<u32>>()
             .happens(|hidden, agv, event| match event {
                 Event::NodeNoted(_) => {
-                    let reached = agv.book.left.0.iter().map(|stop| &stop.node.id);
-                    let again = reached.flat_map(|id| agv.book.nodes.iter().filter(move |ahead| ahead.node.id == *id));
+                    let reached = agv.order.left.0.iter().map(|stop| &stop.node.id);
+                    let again = reached.flat_map(|id| agv.order.nodes.iter().filter(move |ahead| ahead.node.id == *id));
                     hidden.extend(again.map(|ahead| ahead.node.sequence_id));
                 }
                 Event::Begun => hidden.clear(),
@@ -100,10 +58,10 @@ records! {
             .says(|hidden, _, part, _| !matches!(part, Part::Node(stop) if hidden.contains(&stop.node.sequence_id)));
     fault "loop-cut-short" ["ORD-UPD-13", "ORD-06"] "When the vehicle passes a node that is also the last one of its base it takes the order for done and drops the rest."
         => plain().happens(|(), agv, event| if let Event::NodePassed(sequence_id) = event {
-            let reached = agv.book.left.0.as_ref().map(|stop| &stop.node.id);
-            let again = reached == Some(&agv.book.base_end.0) && agv.book.base_end.1 > sequence_id;
-            if again && agv.book.cancel.is_none() {
-                agv.book.drop_route();
+            let reached = agv.order.left.0.as_ref().map(|stop| &stop.node.id);
+            let again = reached == Some(&agv.order.base_end.0) && agv.order.base_end.1 > sequence_id;
+            if again && agv.order.cancel.is_none() {
+                agv.order.drop_route();
                 let behind = |action: &&mut Action| matches!(action.origin, Origin::Node(id) | Origin::Edge(id) if id > sequence_id);
                 agv.actions.iter_mut().filter(behind).for_each(|action| action.end(Status::Failed));
             }
@@ -111,10 +69,10 @@ records! {
     fault "theta-ignored" ["ORD-MSG-10", "ORD-MSG-14", "NODE-01"] "Does not turn to the orientation a node asks for."
         => facing(|_, _, _| None);
     fault "theta-at-end-only" ["ORD-MSG-10", "NODE-01"] "It assumes the theta of the last node of the base only, and passes nodes before that as it comes."
-        => facing(|agv, stop, theta| (stop.node.sequence_id == agv.book.base_end.1).then_some(theta));
+        => facing(|agv, stop, theta| (stop.node.sequence_id == agv.order.base_end.1).then_some(theta));
     fault "no-turn-after-fixed-edge" ["ORD-MSG-11", "ORD-MSG-10"] "After an edge with rotationAllowed false the vehicle does not assume the theta of the node either."
         => facing(|agv, _, theta| {
-            let fixed = agv.book.edge_ahead().and_then(|edge| edge.rotation_allowed) == Some(false);
+            let fixed = agv.order.edge_ahead().and_then(|edge| edge.rotation_allowed) == Some(false);
             (!fixed).then_some(theta)
         });
     fault "theta-taken-as-axis" ["ORD-MSG-10", "ORD-MSG-14", "NODE-01"] "It counts a node with theta as traversed also when it looks the opposite way."
@@ -129,11 +87,11 @@ records! {
     fault "max-speed-ignored-backwards" ["ORD-MSG-20"] "It ignores maxSpeed on edges that it drives backwards."
         => planning(|_, leg| leg.permitted = leg.permitted.filter(|_| !leg.backwards));
     fault "max-speed-of-edge-before" ["ORD-MSG-20", "OPT-01"] "It keeps to the maxSpeed of the edge before the one it drives on."
-        => planning(|agv, leg| leg.permitted = agv.book.left.1.as_ref().and_then(|left| left.max_speed));
+        => planning(|agv, leg| leg.permitted = agv.order.left.1.as_ref().and_then(|left| left.max_speed));
     fault "max-speed-forgotten-in-pause" ["ORD-MSG-20"] "After a pause on an edge it drives the rest of that edge at its own speed, whatever maxSpeed says."
         => keep::<bool>()
             .does(|hurried, agv, action| {
-                *hurried |= is(action, Deed::StopPause) && lifts_pause(agv) && agv.book.entered && agv.holds.pause;
+                *hurried |= is(action, Effect::StopPause) && lifts_pause(agv) && agv.order.entered && agv.holds.pause;
                 None
             })
             .happens(|hurried, _, event| *hurried &= !matches!(event, Event::NodeReached(_) | Event::Begun))
@@ -167,13 +125,13 @@ records! {
         })
         .plans(|_, agv, leg| leg.facing = Facing::Fixed(agv.motion.pose(agv.moment()).theta));
     fault "trajectory-cut" ["ORD-MSG-26"] "Drives straight to the end of an edge that has a trajectory." because "It breaks a recommendation only."
-        => Box::new(Bending(|_, _, _| None));
+        => bending(|_, _, _| None);
     fault "drives-the-control-polygon" ["ORD-MSG-26"] "It drives from control point to control point in straight lines instead of along the curve."
         because "ORD-MSG-26, that a trajectory is followed, is a recommendation; the control points are reached."
-        => Box::new(Bending(|agv, edge, path| match &edge.trajectory {
+        => bending(|agv, edge, path| match &edge.trajectory {
             Some(trajectory) if !agv.obstacles.contains(&edge.id) => Some(control_polygon(&trajectory.sent)),
             _ => Some(path),
-        }));
+        });
     fault "direction-ignored" ["ORD-MSG-27", "STATE-MSG-04"] "Takes the same branch at a junction whatever direction it is given."
         => branching(|branches, _| branches.first().cloned());
     fault "direction-mistaken" ["ORD-MSG-27", "STATE-MSG-04"] "Takes the branch beside the one it is told."
@@ -200,7 +158,7 @@ records! {
     fault "corridor-of-update-not-watched" ["CORR-06", "CORR-07"] "It does not watch the corridors of edges that an update has added."
         => keep::<Option<u32>>()
             .adopts(|joint, agv, adoption| {
-                *joint = adoption.update.then(|| joint.unwrap_or(agv.book.base_end.1));
+                *joint = adoption.update.then(|| joint.unwrap_or(agv.order.base_end.1));
                 true
             })
             .allows(|joint, _, what, usual| usual && !matches!(what, Permission::Watch(edge, _) if joint.is_some_and(|joint| edge.sequence_id > joint)));
@@ -232,7 +190,7 @@ records! {
         });
     fault "planned-path-changes" ["STATE-15"] "Plans anew when it enters an edge."
         => path(|agv, edge, points, knots| {
-            if agv.book.entered && agv.book.edge_ahead() == Some(edge) {
+            if agv.order.entered && agv.order.edge_ahead() == Some(edge) {
                 let ((x1, y1), (x2, y2)) = (points[0], points[1]);
                 points.insert(1, (f64::midpoint(x1, x2) + 1.0, f64::midpoint(y1, y2) + 1.0));
                 knots.insert(2, 0.5);
@@ -259,60 +217,60 @@ records! {
         });
     fault "axes-mirrored" ["MAP-01"] "Reports its position with y to the right."
         => mirrored();
-    liberty "stops-on-nodes" ["ORD-06", "STATE-08"] "Stops for a moment on every node."
+    tolerance "stops-on-nodes" ["ORD-06", "STATE-08"] "Stops for a moment on every node."
         => plain().happens(|(), agv, event| if matches!(event, Event::NodeReached(_)) { linger(agv, 100) });
-    liberty "stops-short-of-node" ["ORD-MSG-13", "NODE-01"] "It counts a node that allows a deviation as traversed eight centimetres before it, and stands there."
+    tolerance "stops-short-of-node" ["ORD-MSG-13", "NODE-01"] "It counts a node that allows a deviation as traversed eight centimetres before it, and stands there."
         => planning(|agv, leg| {
             let allowed = leg.stop.node.position.as_ref().and_then(|position| position.allowed_deviation);
             if allowed.is_some_and(|allowed| allowed > 0.16) && leg.distance > 1.0 && leg.is_whole() {
                 leg.way = leg.distance - f64::min(0.08, agv.config.reach * 0.8);
             }
         });
-    liberty "lib-early-traversal" ["NODE-01"] "It reports a node traversed as soon as it enters the deviation range of the node."
+    tolerance "lib-early-traversal" ["NODE-01"] "It reports a node traversed as soon as it enters the deviation range of the node."
         => planning(|agv, leg| if let Some(early) = early_by(agv, leg.stop).filter(|_| leg.is_whole()) {
             leg.end_before(early);
         })
         .happens(|_, agv, event| {
             // It ends on the node now and not before it: the rest of the way is planned anew.
-            if event == Event::CancelBegun && agv.book.cancel.as_ref().is_some_and(|cancel| cancel.to_node) {
+            if event == Event::CancelBegun && agv.order.cancel.as_ref().is_some_and(|cancel| cancel.to_node) {
                 agv.motion.halt(agv.moment());
             }
         });
-    liberty "semiautomatic-at-full-speed" ["MODE-03"] "It drives as fast in SEMIAUTOMATIC as in AUTOMATIC."
+    tolerance "semiautomatic-at-full-speed" ["MODE-03"] "It drives as fast in SEMIAUTOMATIC as in AUTOMATIC."
         => planning(|agv, leg| leg.own = agv.config.speed);
-    liberty "keeps-below-max-speed" ["ORD-MSG-20"] "It drives at four fifths of the maxSpeed of an edge."
+    tolerance "keeps-below-max-speed" ["ORD-MSG-20"] "It drives at four fifths of the maxSpeed of an edge."
         => planning(|_, leg| leg.permitted = leg.permitted.map(|permitted| permitted * 0.8));
-    liberty "turns-the-long-way" ["ORD-MSG-10", "ORD-MSG-24"] "The vehicle turns to an orientation the long way round."
+    tolerance "turns-the-long-way" ["ORD-MSG-10", "ORD-MSG-24"] "The vehicle turns to an orientation the long way round."
         => letting(|_, what| matches!(what, Permission::TurnTheLongWay));
-    liberty "own-orientation-at-end" ["ORD-MSG-10"] "On the last node of its base, where the order asks for no theta, the vehicle turns to an orientation of its own before it reports the node."
+    tolerance "own-orientation-at-end" ["ORD-MSG-10"] "On the last node of its base, where the order asks for no theta, the vehicle turns to an orientation of its own before it reports the node."
         => plain().faces(|(), agv, stop, wanted| {
-            let ends = stop.node.sequence_id > 0 && stop.node.sequence_id == agv.book.base_end.1;
+            let ends = stop.node.sequence_id > 0 && stop.node.sequence_id == agv.order.base_end.1;
             wanted.or((ends && stop.node.position.is_some()).then_some(0.0))
         });
-    liberty "backs-up" ["MAP-03", "ORD-MSG-22"] "Where an edge asks for no orientation the vehicle drives backwards to a node that lies behind it instead of turning."
+    tolerance "backs-up" ["MAP-03", "ORD-MSG-22"] "Where an edge asks for no orientation the vehicle drives backwards to a node that lies behind it instead of turning."
         => steering(|agv, course| {
             let free = course.edge.is_some_and(|edge| edge.orientation.is_none()) && !course.curved;
             let behind = motion::wrapped(course.heading - agv.motion.pose(agv.moment()).theta).abs() > FRAC_PI_2 + 0.1;
             course.backwards |= free && behind;
         });
-    liberty "paths-reported" ["STATE-14", "STATE-MSG-13"] "It reports the trajectory it drives on in its edge states although it does not plan its path itself."
+    tolerance "paths-reported" ["STATE-14", "STATE-MSG-13"] "It reports the trajectory it drives on in its edge states although it does not plan its path itself."
         => letting(|agv, what| matches!(what, Permission::ReportPath) && !agv.config.line_guided());
-    liberty "position-trembles" ["STATE-MSG-05", "STATE-MSG-08"] "The position it reports varies by some millimetres, also when it stands."
+    tolerance "position-trembles" ["STATE-MSG-05", "STATE-MSG-08"] "The position it reports varies by some millimetres, also when it stands."
         => position(|agv, p| {
             let trembling = [0.0, 0.003, -0.002, 0.001, -0.003][usize::try_from(agv.states_sent % 5).unwrap_or_default()];
             p.change("x", |x| *x = json!(x.as_f64().unwrap_or_default() + trembling));
         });
-    liberty "theta-minus-pi" ["MAP-02", "STATE-MSG-05"] "It reports an orientation of half a turn as minus pi."
+    tolerance "theta-minus-pi" ["MAP-02", "STATE-MSG-05"] "It reports an orientation of half a turn as minus pi."
         => position(|_, p| if p.get("theta").and_then(Value::as_f64).is_some_and(|theta| theta > PI - 1e-9) {
             p.set("theta", -PI);
         });
-    liberty "position-rounded" ["STATE-MSG-05", "MAP-02"] "It rounds its position to whole centimetres and its orientation to milliradians."
+    tolerance "position-rounded" ["STATE-MSG-05", "MAP-02"] "It rounds its position to whole centimetres and its orientation to milliradians."
         => position(|_, p| {
             number(p, "x", |x| (x * 100.0).round() / 100.0);
             number(p, "y", |y| (y * 100.0).round() / 100.0);
             number(p, "theta", |theta| (theta * 1000.0).trunc() / 1000.0);
         });
-    liberty "velocity-trembles" ["STATE-MSG-08", "STATE-MSG-05"] "It reports velocities of about a millimetre per second at standstill."
+    tolerance "velocity-trembles" ["STATE-MSG-08", "STATE-MSG-05"] "It reports velocities of about a millimetre per second at standstill."
         => velocity(|agv, v| {
             let noise = [0.001, -0.001, 0.0][usize::try_from(agv.states_sent % 3).unwrap_or_default()];
             if !agv.motion.is_moving() {
@@ -323,7 +281,7 @@ records! {
                 *omega = json!(noise);
             });
         });
-    liberty "node-positions-from-layout" ["STATE-MSG-13"] "The nodeStates give a nodePosition also where the order had none, from the layout of the vehicle."
+    tolerance "node-positions-from-layout" ["STATE-MSG-13"] "The nodeStates give a nodePosition also where the order had none, from the layout of the vehicle."
         => node(|agv, stop, m| {
             if !agv.config.line_guided() && !m.contains_key("nodePosition") {
                 m.set("nodePosition", json!({ "x": stop.place.x, "y": stop.place.y, "mapId": stop.place.map_id }));
@@ -334,7 +292,7 @@ records! {
 
 /// Drives on into the horizon by itself, a moment after it has stopped at the decision point.
 fn slipping(speed: fn(f64) -> f64) -> Box<dyn Deviation> {
-    #[derive(Default)]
+    #[derive(Clone, Default)]
     struct Slip {
         due: Option<Moment>,
         slipped: bool,
@@ -343,7 +301,7 @@ fn slipping(speed: fn(f64) -> f64) -> Box<dyn Deviation> {
         fn happens(&mut self, agv: &Agv, event: Event) {
             match event {
                 Event::Begun => *self = Self::default(),
-                Event::NodePassed(_) if agv.book.cancel.is_none() && agv.waits_at_decision_point() => {
+                Event::NodePassed(_) if agv.order.cancel.is_none() && agv.waits_at_decision_point() => {
                     self.due = Some(agv.moment() + MOMENT);
                 }
                 Event::Woken => self.slipped |= self.due.take_if(|due| *due <= agv.moment()).is_some(),
@@ -359,7 +317,7 @@ fn slipping(speed: fn(f64) -> f64) -> Box<dyn Deviation> {
                 leg.own = speed(agv.config.speed);
             }
         })
-        .due(|(_, slip)| slip.due)
+        .due(|(_, slip), _| slip.due)
 }
 
 type Noted = fn(&mut Agv, u32);
@@ -377,7 +335,7 @@ fn noted(then: Noted) -> Box<Hooks<Noted>> {
 fn turns_late(agv: &Agv) -> bool {
     let pose = agv.motion.pose(agv.moment());
     let behind = |left: &Stop| pose.distance(left.place.x, left.place.y) > 0.2;
-    !agv.book.left.0.as_ref().is_some_and(behind)
+    !agv.order.left.0.as_ref().is_some_and(behind)
 }
 
 type Early = fn(&Stop) -> bool;
@@ -391,7 +349,7 @@ fn ending_early(which: Early) -> Box<Hooks<Early>> {
             }
         })
         .happens(|which, agv, event| {
-            let left = agv.book.left.0.as_ref().filter(|left| which(left));
+            let left = agv.order.left.0.as_ref().filter(|left| which(left));
             let Some(to) = left.map(|left| (left.place.x, left.place.y)) else {
                 return;
             };
@@ -403,13 +361,11 @@ fn ending_early(which: Early) -> Box<Hooks<Early>> {
         })
 }
 
-/// Takes another way than the trajectory of an edge; a straight one where there is none.
-struct Bending(fn(&Agv, &Edge, Path) -> Option<Path>);
+type Bending = fn(&Agv, &Edge, Path) -> Option<Path>;
 
-impl Deviation for Bending {
-    fn bends(&self, agv: &Agv, edge: &Edge, path: Path) -> Option<Path> {
-        (self.0)(agv, edge, path)
-    }
+/// Takes another way than the trajectory of an edge; a straight one where there is none.
+fn bending(way: Bending) -> Box<dyn Deviation> {
+    holding(way).bends(|way, agv, edge, path| way(agv, edge, path))
 }
 
 /// The way from control point to control point of a trajectory.
@@ -439,13 +395,7 @@ fn branching(choice: Branching) -> Box<Hooks<Branching>> {
 
 /// Understands its corridors otherwise.
 fn keeping(change: fn(&mut Corridor)) -> Box<dyn Deviation> {
-    struct Keeping(fn(&mut Corridor));
-    impl Deviation for Keeping {
-        fn keeps_to(&self, _: &Agv, corridor: &mut Corridor) {
-            (self.0)(corridor);
-        }
-    }
-    Box::new(Keeping(change))
+    holding(change).keeps_to(|change, _, corridor| change(corridor))
 }
 
 type Points = Vec<(f64, f64)>;
@@ -454,34 +404,29 @@ type Planned = fn(&Agv, &Edge, &mut Points, &mut Vec<f64>);
 
 /// Reports another path than the straight one it has planned: its points and knots.
 fn path(change: Planned) -> Box<dyn Deviation> {
-    struct Planning(Planned);
-    impl Deviation for Planning {
-        fn says(&self, agv: &Agv, part: Part<'_>, words: &mut Object) -> bool {
-            if let Part::Edge(edge) = part
-                && edge.trajectory.is_none()
-            {
-                words.part("trajectory", |path| {
-                    let number = |point: &Value, axis: &str| point[axis].as_f64().unwrap_or_default();
-                    let points = path.list("controlPoints").iter();
-                    let mut points: Points = points.map(|point| (number(point, "x"), number(point, "y"))).collect();
-                    let mut knots = vec![0.0, 0.0, 1.0, 1.0];
-                    (self.0)(agv, edge, &mut points, &mut knots);
-                    let point = |(x, y): (f64, f64)| json!({ "x": x, "y": y, "weight": 1.0 });
-                    path.set("controlPoints", points.into_iter().map(point).collect::<Vec<_>>());
-                    path.set("knotVector", knots);
-                });
-            }
-            true
+    holding(change).says(|change, agv, part, words| {
+        if let Part::Edge(edge) = part
+            && edge.trajectory.is_none()
+        {
+            words.part("trajectory", |path| {
+                let number = |point: &Value, axis: &str| point[axis].as_f64().unwrap_or_default();
+                let points = path.list("controlPoints").iter();
+                let mut points: Points = points.map(|point| (number(point, "x"), number(point, "y"))).collect();
+                let mut knots = vec![0.0, 0.0, 1.0, 1.0];
+                change(agv, edge, &mut points, &mut knots);
+                let point = |(x, y): (f64, f64)| json!({ "x": x, "y": y, "weight": 1.0 });
+                path.set("controlPoints", points.into_iter().map(point).collect::<Vec<_>>());
+                path.set("knotVector", knots);
+            });
         }
-    }
-    Box::new(Planning(change))
+        true
+    })
 }
 
 /// Counts y to the right: what it reports, and what it is told of places it does not know.
 fn mirrored() -> Box<dyn Deviation> {
-    struct Mirrored;
-    impl Deviation for Mirrored {
-        fn says(&self, agv: &Agv, part: Part<'_>, words: &mut Object) -> bool {
+    plain()
+        .says(|(), agv, part, words| {
             match part {
                 Part::Position => number(words, "y", |y| -y),
                 Part::Node(stop) if agv.config.node(&stop.node.id).is_none() => {
@@ -490,9 +435,8 @@ fn mirrored() -> Box<dyn Deviation> {
                 _ => {}
             }
             true
-        }
-
-        fn reads(&self, agv: &Agv, message: &mut Value) {
+        })
+        .reads(|(), agv, message| {
             let nodes = message.get_mut("nodes").and_then(Value::as_array_mut);
             for node in nodes.into_iter().flatten() {
                 let known = node["nodeId"].as_str().is_some_and(|id| agv.config.node(id).is_some());
@@ -500,17 +444,14 @@ fn mirrored() -> Box<dyn Deviation> {
                     number(place, "y", |y| -y);
                 }
             }
-        }
-
-        fn does(&mut self, agv: &mut Agv, action: &Action) -> Option<Outcome> {
+        })
+        .does(|(), agv, action| {
             let mut turned = action.clone();
             let y = turned.request.parameters.iter_mut().find(|(key, _)| key == "y");
-            let value = y.filter(|_| is(action, Deed::InitPosition)).map(|(_, value)| value)?;
+            let value = y.filter(|_| is(action, Effect::InitPosition)).map(|(_, value)| value)?;
             *value = json!(-value.as_f64()?);
             Some(agv.init_position(&turned).into())
-        }
-    }
-    Box::new(Mirrored)
+        })
 }
 
 /// How far before a node on its way it may report it.
@@ -519,8 +460,8 @@ fn mirrored() -> Box<dyn Deviation> {
 /// node itself.
 fn early_by(agv: &Agv, stop: &Stop) -> Option<f64> {
     let sequence_id = stop.node.sequence_id;
-    let passes = sequence_id < agv.book.base_end.1 && agv.book.cancel.is_none();
-    let mut ahead = agv.book.edges.iter().filter(|edge| edge.sequence_id > sequence_id);
+    let passes = sequence_id < agv.order.base_end.1 && agv.order.cancel.is_none();
+    let mut ahead = agv.order.edges.iter().filter(|edge| edge.sequence_id > sequence_id);
     let free = stop.node.actions.is_empty() && ahead.next().is_none_or(|edge| edge.corridor.is_none());
     let position = stop.node.position.as_ref().filter(|_| passes && free);
     let allowed = position

@@ -1,11 +1,6 @@
 //! Deviations of what a state says about errors (section 6.10.5).
 
-use super::hooks::{error, state};
-use crate::agv::errors::{ActiveError, Life};
-use crate::agv::seam::Deviation;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::{Value, json};
+use super::prelude::*;
 
 records! {
     fault "errors-omitted" ["STATE-MSG-01", "ERR-01", "JSON-10"] "Leaves the errors array out when there is no error."

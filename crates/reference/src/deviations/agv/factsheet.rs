@@ -1,11 +1,8 @@
 //! Deviations of what the factsheet says (section 6.15).
 
-use super::hooks::{Object, factsheet, sending, text};
 use crate::agv::config::MAX_INSTANT_ACTIONS;
-use crate::agv::seam::Deviation;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::{Value, json};
+
+use super::prelude::*;
 
 records! {
     fault "factsheet-without-limits" ["FACT-02", "FACT-05"] "Leaves protocolLimits out of the factsheet."

@@ -1,11 +1,6 @@
 //! Deviations of the header: what names the vehicle, counts its messages, and tells time and version (section 6.4).
 
-use super::hooks::{header, keep, text};
-use crate::agv::Agv;
-use crate::agv::seam::Deviation;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::Value;
+use super::prelude::*;
 
 records! {
     fault "header-without-manufacturer" ["HDR-01", "HDR-05"] "Leaves the manufacturer out of the header of its states."

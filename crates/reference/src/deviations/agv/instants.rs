@@ -1,46 +1,17 @@
 //! Deviations of instant actions: which are read, refused, begun, and when (section 6.9).
 
-use super::hooks::Hooks;
-use super::hooks::after;
-use super::hooks::forbidding;
-use super::hooks::holding;
-use super::hooks::is;
-use super::hooks::is_acting;
-use super::hooks::keep;
-use super::hooks::letting;
-use super::hooks::plain;
-use super::hooks::raising;
-use super::hooks::when;
-use crate::Output;
-use crate::Publication;
-use crate::agv::Agv;
-use crate::agv::Mode;
-use crate::agv::action_kinds;
-use crate::agv::action_kinds::Deed;
 use crate::agv::action_kinds::Scope;
-use crate::agv::actions::Action;
-use crate::agv::actions::Origin;
-use crate::agv::actions::Status;
-use crate::agv::deeds::Outcome;
-use crate::agv::errors::ActiveError;
 use crate::agv::order_message::Blocking;
-use crate::agv::seam::Cause;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Permission;
-use crate::agv::seam::Span;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::Value;
-use serde_json::json;
-use std::time::Duration;
-use tck_base::clock::Moment;
+use crate::agv::{Mode, action_kinds};
+use crate::{Output, Publication};
+
+use super::prelude::*;
 
 records! {
     fault "state-request-listed-refused" ["FACT-07", "ACT-26"] "Does not understand stateRequest although its factsheet lists it."
-        => forbidding(|_, what| matches!(what, Permission::Fit(kind) if kind.deed == Deed::StateRequest));
+        => forbidding(|_, what| matches!(what, Permission::Fit(kind) if kind.effect == Effect::StateRequest));
     fault "log-report-listed-refused" ["FACT-07", "ACT-01"] "logReport is listed in the factsheet and FAILED as unknown when it is sent."
-        => forbidding(|_, what| matches!(what, Permission::Fit(kind) if kind.deed == Deed::LogReport));
+        => forbidding(|_, what| matches!(what, Permission::Fit(kind) if kind.effect == Effect::LogReport));
     fault "instant-scope-unchecked" ["ACT-10"] "It performs an action as an instant action that is for nodes only, such as pick."
         => letting(|_, what| matches!(what, Permission::Fit(_)));
     fault "semiautomatic-instant-refused" ["MODE-02"] "In SEMIAUTOMATIC it takes orders but reports every instant action FAILED."
@@ -49,7 +20,7 @@ records! {
         => forbidding(|agv, what| matches!(what, Permission::Fit(_)) && !agv.errors.is_empty());
     fault "init-position-without-node-taken" ["ACT-25", "ACT-24"] "initPosition without lastNodeId is FINISHED and clears lastNodeId."
         because "The ruling of ACT-25 fails an unknown map and a missing parameter only; that nobody can know the node is warned of."
-        => forbidding(|_, what| matches!(what, Permission::RefuseInstant(action) if is(action, Deed::InitPosition) && action.request.parameter("lastNodeId").is_none()));
+        => forbidding(|_, what| matches!(what, Permission::RefuseInstant(action) if is(action, Effect::InitPosition) && action.request.parameter("lastNodeId").is_none()));
     fault "bad-parameter-instant-finished" ["IACT-06", "ACT-25"] "An instant action with a missing or wrong parameter is FINISHED although nothing was done."
         => unrefused(|agv, action| {
             let fit = action.kind.filter(|kind| kind.scopes.contains(&Scope::Instant));
@@ -103,7 +74,7 @@ records! {
     fault "acknowledges-on-instant-actions" ["TOPIC-15"] "The vehicle answers every instantActions message with an empty message of its own on the same topic."
         => batch(|agv, actions| if !actions.is_empty() { acknowledge(agv) });
     fault "instant-action-deferred" ["IACT-05"] "Begins instant actions other than cancelOrder only when its order is complete."
-        => deferring(|agv, action| agv.is_busy() && !is(action, Deed::CancelOrder));
+        => deferring(|agv, action| agv.is_busy() && !is(action, Effect::CancelOrder));
     fault "instant-actions-wait-for-pause" ["IACT-05"] "While it is paused it holds back instant actions until the pause is lifted."
         => deferring(|agv, action| agv.holds.pause && !is_urgent(action));
     fault "instant-waits-for-running-action" ["IACT-05"] "As long as an action of the order is under way instant actions wait, except pause and cancelOrder."
@@ -133,7 +104,7 @@ records! {
         });
     fault "instant-action-stuck" ["IACT-04"] "Leaves instant actions RUNNING for ever."
         => plain()
-            .lasts(|_, what, usual| match what {
+            .lasts(|_, _, what, usual| match what {
                 Span::Action(action) if !action.of_order() => Duration::MAX,
                 _ => usual,
             })
@@ -142,25 +113,25 @@ records! {
                 other => other,
             });
     fault "state-request-stuck" ["ACT-26", "IACT-04"] "Leaves stateRequest RUNNING for ever."
-        => after(Deed::StateRequest, |agv, action, outcome| match outcome {
+        => after(Effect::StateRequest, |agv, action, outcome| match outcome {
             Outcome::Done(result) if !action.of_order() => stays_running(agv, action, result),
             other => other,
         });
-    liberty "batch-reversed" ["IACT-07"] "It performs the actions of one instantActions message from the last to the first."
+    tolerance "batch-reversed" ["IACT-07"] "It performs the actions of one instantActions message from the last to the first."
         => batch(|_, actions| actions.reverse());
-    liberty "unreadable-instant-ignored" ["IACT-03"] "The vehicle ignores an instantActions message that is not JSON or has no array of actions, without an error."
+    tolerance "unreadable-instant-ignored" ["IACT-03"] "The vehicle ignores an instantActions message that is not JSON or has no array of actions, without an error."
         => raising(|_, cause, _| !matches!(cause, Cause::Unreadable(reason) if reason.starts_with("the message")));
-    liberty "refused-instant-without-error" ["IACT-06"] "It reports an instant action that it cannot perform FAILED without an error."
+    tolerance "refused-instant-without-error" ["IACT-06"] "It reports an instant action that it cannot perform FAILED without an error."
         => keep::<bool>()
             .allows(|_, _, what, usual| usual && !matches!(what, Permission::BeginInstant(action) if is_unfit(action)))
             .raises(|_, agv, cause, _| match cause {
                 Cause::Failure(Some(action)) => action.of_order() || !was_refused(agv, action),
                 _ => true,
             });
-    liberty "init-position-takes-time" ["ACT-23", "ACT-41"] "initPosition is RUNNING for a moment before the pose is taken over."
-        => letting(|_, what| matches!(what, Permission::TakeTime(action) if is(action, Deed::InitPosition)));
-    liberty "map-actions-take-time" ["MAP-24", "MAP-29", "ACT-41"] "enableMap and deleteMap are RUNNING for a moment before the maps change."
-        => letting(|_, what| matches!(what, Permission::TakeTime(action) if is(action, Deed::EnableMap) || is(action, Deed::DeleteMap)));
+    tolerance "init-position-takes-time" ["ACT-23", "ACT-41"] "initPosition is RUNNING for a moment before the pose is taken over."
+        => letting(|_, what| matches!(what, Permission::TakeTime(action) if is(action, Effect::InitPosition)));
+    tolerance "map-actions-take-time" ["MAP-24", "MAP-29", "ACT-41"] "enableMap and deleteMap are RUNNING for a moment before the maps change."
+        => letting(|_, what| matches!(what, Permission::TakeTime(action) if is(action, Effect::EnableMap) || is(action, Effect::DeleteMap)));
 }
 
 /// Whether it is not for instantActions.
@@ -176,8 +147,8 @@ fn was_refused(agv: &Agv, action: &Action) -> bool {
 
 /// What the vehicle obeys at any time.
 fn is_urgent(action: &Action) -> bool {
-    let urgent = [Deed::StartPause, Deed::StopPause, Deed::CancelOrder];
-    urgent.into_iter().any(|deed| is(action, deed))
+    let urgent = [Effect::StartPause, Effect::StopPause, Effect::CancelOrder];
+    urgent.into_iter().any(|effect| is(action, effect))
 }
 
 type Told = fn(&Agv, &Action) -> bool;
@@ -210,39 +181,24 @@ type Ending = fn(&Action) -> bool;
 
 /// Takes nothing of a message behind some action that has failed.
 fn ending_batch(at: Ending) -> Box<dyn Deviation> {
-    struct Batch(Ending, bool);
-    impl Deviation for Batch {
-        fn reads_instants(&mut self, _: &mut Agv, _: &mut Vec<&Value>) {
-            self.1 = false;
-        }
-
-        fn raises(&mut self, _: &mut Agv, cause: Cause<'_>, _: &mut ActiveError) -> bool {
-            self.1 |= match cause {
-                Cause::Failure(Some(action)) => !action.of_order() && (self.0)(action),
+    holding((at, false))
+        .reads_instants(|(_, ended), _, _| *ended = false)
+        .raises(|(at, ended), _, cause, _| {
+            *ended |= match cause {
+                Cause::Failure(Some(action)) => !action.of_order() && at(action),
                 Cause::NothingToCancel => true,
                 _ => false,
             };
             true
-        }
-
-        fn allows(&self, _: &Agv, what: Permission<'_>, usual: bool) -> bool {
-            usual && !(self.1 && matches!(what, Permission::TakeInstant))
-        }
-    }
-    Box::new(Batch(at, false))
+        })
+        .allows(|(_, ended), _, what, usual| usual && !(*ended && matches!(what, Permission::TakeInstant)))
 }
 
 type Batch = fn(&mut Agv, &mut Vec<&Value>);
 
 /// Does something with the actions of a message before it reads them.
 fn batch(change: Batch) -> Box<dyn Deviation> {
-    struct Reading(Batch);
-    impl Deviation for Reading {
-        fn reads_instants(&mut self, agv: &mut Agv, actions: &mut Vec<&Value>) {
-            (self.0)(agv, actions);
-        }
-    }
-    Box::new(Reading(change))
+    holding(change).reads_instants(|change, agv, actions| change(agv, actions))
 }
 
 /// Answers master control on its own topic.

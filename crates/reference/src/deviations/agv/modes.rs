@@ -1,35 +1,9 @@
 //! Deviations of operating modes, and of what people do to the vehicle (section 6.10.6, MODE-01 to MODE-06).
 
-use super::hooks::MOMENT;
-use super::hooks::forbidding;
-use super::hooks::is_acting;
-use super::hooks::keep;
-use super::hooks::letting;
-use super::hooks::objecting;
-use super::hooks::parked;
-use super::hooks::plain;
-use super::hooks::raising;
-use super::hooks::when;
-use crate::agv::Agv;
 use crate::agv::Mode;
-use crate::agv::actions::Action;
-use crate::agv::actions::Status;
-use crate::agv::book::Book;
-use crate::agv::errors::Life;
-use crate::agv::rejection::Refusal;
-use crate::agv::rejection::Rule;
-use crate::agv::seam::Cause;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Hindrance;
-use crate::agv::seam::Objection;
-use crate::agv::seam::Part;
-use crate::agv::seam::Permission;
-use crate::agv::seam::Relation;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::json;
-use std::time::Duration;
+use crate::agv::order_state::OrderState;
+
+use super::prelude::*;
 
 records! {
     fault "semiautomatic-refused" ["MODE-02"] "Refuses orders in SEMIAUTOMATIC."
@@ -65,18 +39,18 @@ records! {
     fault "manual-keeps-actions" ["MODE-05", "MODE-02"] "Clears its way in MANUAL and goes on with its actions."
         => letting(|_, what| matches!(what, Permission::KeepOrder(_))).happens(|_, agv, event| if loses_order(agv, event) {
             agv.motion.halt(agv.moment());
-            agv.book.drop_route();
-            agv.book.cancelled = true;
+            agv.order.drop_route();
+            agv.order.cancelled = true;
         });
     fault "order-taken-up-again" ["MODE-05"] "Remembers the order it gave up in MANUAL, and takes it up again when it is back in AUTOMATIC."
-        => keep::<Option<Book>>().happens(|order, agv, event| {
+        => keep::<Option<OrderState>>().happens(|order, agv, event| {
             if loses_order(agv, event) {
-                *order = Some(agv.book.clone());
+                *order = Some(agv.order.clone());
             }
             if matches!(event, Event::ModeChanged(_))
                 && let Some(order) = order.take_if(|_| agv.mode.takes_orders())
             {
-                agv.book = order;
+                agv.order = order;
             }
         });
     fault "manual-position-stale" ["MODE-06", "STATE-MSG-05"] "Does not follow its position in MANUAL."
@@ -106,15 +80,15 @@ records! {
             active.for_each(|action| action.end(Status::Finished));
         });
     fault "manual-keeps-horizon" ["MODE-05", "STATE-13"] "Switched to MANUAL it clears the base of its order and keeps the horizon."
-        => keep::<Option<Book>>().happens(|before, agv, event| {
+        => keep::<Option<OrderState>>().happens(|before, agv, event| {
             if loses_order(agv, event) {
-                *before = Some(agv.book.clone());
+                *before = Some(agv.order.clone());
             }
             if matches!(event, Event::GivenUpForMode(_))
                 && let Some(before) = before.take()
             {
-                agv.book.nodes.extend(before.nodes.into_iter().filter(|stop| !stop.node.released));
-                agv.book.edges.extend(before.edges.into_iter().filter(|edge| !edge.released));
+                agv.order.nodes.extend(before.nodes.into_iter().filter(|stop| !stop.node.released));
+                agv.order.edges.extend(before.edges.into_iter().filter(|edge| !edge.released));
             }
         });
     fault "manual-leaves-actions-waiting" ["MODE-05"] "It clears nodes and edges when it enters MANUAL but leaves the actions of the order WAITING."
@@ -131,7 +105,7 @@ records! {
                     again.for_each(|action| action.status = Status::Waiting);
                 }
             })
-            .allows(|_, agv, what, usual| usual && !matches!(what, Permission::Count(action) if agv.book.cancelled && action.status == Status::Waiting));
+            .allows(|_, agv, what, usual| usual && !matches!(what, Permission::Count(action) if agv.order.cancelled && action.status == Status::Waiting));
     fault "silent-in-manual" ["MODE-06", "STATE-02"] "After the state that reports MANUAL it sends none until it leaves that mode."
         => forbidding(|agv, what| {
             let last = agv.report.last.as_ref().and_then(|(_, last)| last.get("operatingMode"));
@@ -174,19 +148,19 @@ records! {
     fault "rejection-gone-when-order-done" ["ORD-REJ-03", "ORD-REJ-08"] "It removes the warnings about refused orders when the order under way is complete, before a new order is accepted."
         => keep::<bool>().happens(|busy, agv, event| if event == Event::Settled {
             let before = std::mem::replace(busy, agv.is_busy());
-            if before && !*busy && !agv.book.cancelled {
+            if before && !*busy && !agv.order.cancelled {
                 agv.errors.forget_refusals();
             }
         });
-    liberty "order-id-survives-power-cycle" ["STATE-MSG-02"] "After it was switched off and on it still reports the orderId and orderUpdateId of its last order."
+    tolerance "order-id-survives-power-cycle" ["STATE-MSG-02"] "After it was switched off and on it still reports the orderId and orderUpdateId of its last order."
         => keep::<(String, u32)>().happens(|(id, update_id), agv, event| match event {
             Event::PowerCycled => {
-                (agv.book.order_id, agv.book.update_id) = (id.clone(), *update_id);
-                agv.book.cancelled = agv.book.has_order();
+                (agv.order.order_id, agv.order.update_id) = (id.clone(), *update_id);
+                agv.order.cancelled = agv.order.has_order();
             }
             Event::Begun | Event::Updated => {
-                id.clone_from(&agv.book.order_id);
-                *update_id = agv.book.update_id;
+                id.clone_from(&agv.order.order_id);
+                *update_id = agv.order.update_id;
             }
             _ => {}
         });

@@ -1,10 +1,6 @@
 //! Deviations of position and velocity, in states and visualizations alike (section 6.10.6).
 
-use super::hooks::{number, position, text, velocity};
-use crate::agv::seam::Deviation;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::Value;
+use super::prelude::*;
 
 records! {
     fault "position-frozen" ["MAP-01"] "Reports the position at which it was switched on wherever it is."

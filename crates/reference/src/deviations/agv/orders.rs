@@ -1,52 +1,10 @@
 //! Deviations of which orders are taken over, and how (section 6.6 and figure 8).
 
-use super::hooks::Hooks;
-use super::hooks::allowing;
-use super::hooks::brief;
-use super::hooks::forbidding;
-use super::hooks::heedless;
-use super::hooks::is;
-use super::hooks::keep;
-use super::hooks::letting;
-use super::hooks::linger;
-use super::hooks::objecting;
-use super::hooks::overlooking;
-use super::hooks::parked;
-use super::hooks::plain;
-use super::hooks::refusal;
-use super::hooks::unbound;
-use super::hooks::when;
-use crate::Output;
-use crate::Publication;
-use crate::agv::Agv;
-use crate::agv::action_kinds::Deed;
-use crate::agv::actions::Action;
-use crate::agv::actions::Status;
-use crate::agv::book::Stop;
-use crate::agv::deeds::Outcome;
-use crate::agv::errors::ActiveError;
-use crate::agv::errors::Life;
 use crate::agv::motion;
-use crate::agv::order_message::Blocking;
-use crate::agv::order_message::Node;
-use crate::agv::order_message::Order;
-use crate::agv::rejection::Refusal;
-use crate::agv::rejection::Rule;
-use crate::agv::seam::Adoption;
-use crate::agv::seam::Cause;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Lack;
-use crate::agv::seam::Objection;
-use crate::agv::seam::Part;
-use crate::agv::seam::Permission;
-use crate::agv::seam::Relation;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::Value;
-use serde_json::json;
-use std::time::Duration;
-use tck_base::clock::Moment;
+use crate::agv::order_message::{Blocking, Node};
+use crate::{Output, Publication};
+
+use super::prelude::*;
 
 records! {
     fault "crashes-on-malformed-order" ["ORD-REJ-02", "ORD-REJ-17"] "Ends its connection over an order that it cannot read, and comes back."
@@ -86,16 +44,16 @@ records! {
     fault "theta-difference-not-wrapped" ["ORD-04", "ORD-FLOW-04"] "It takes the plain difference of two angles at the start check, so that a first node whose theta lies just beyond pi is refused as too far although it stands on it."
         => forbidding(|agv, what| matches!(what, Permission::BeginAt(node) if is_turned_by_plain_difference(agv, node)));
     fault "last-node-trusted" ["ORD-FLOW-04"] "A new order that begins with the node of lastNodeId is taken over however far away the vehicle stands by now."
-        => letting(|agv, what| matches!(what, Permission::BeginAt(node) if node.id == agv.book.last_node));
+        => letting(|agv, what| matches!(what, Permission::BeginAt(node) if node.id == agv.order.last_node));
     fault "temporary-node-refused" ["ORD-CANCEL-15"] "Refuses orders that begin at a node it has never heard of."
-        => forbidding(|agv, what| matches!(what, Permission::BeginAt(node) if agv.config.node(&node.id).is_none() && node.id != agv.book.last_node));
+        => forbidding(|agv, what| matches!(what, Permission::BeginAt(node) if agv.config.node(&node.id).is_none() && node.id != agv.order.last_node));
     fault "temporary-node-not-reached" ["ORD-CANCEL-15"] "Takes over an order with one node it has never heard of, and never counts it as reached."
         => plain()
-            .happens(|(), agv, event| if event == Event::Begun && agv.book.nodes.front().is_some_and(|stop| agv.config.node(&stop.node.id).is_none()) {
+            .happens(|(), agv, event| if event == Event::Begun && agv.order.nodes.front().is_some_and(|stop| agv.config.node(&stop.node.id).is_none()) {
                 agv.motion.reached = false;
             })
             .allows(|(), agv, what, usual| {
-                let alone = |stop: &Stop| agv.book.base_end.1 == 0 && agv.config.node(&stop.node.id).is_none();
+                let alone = |stop: &Stop| agv.order.base_end.1 == 0 && agv.config.node(&stop.node.id).is_none();
                 usual && !matches!(what, Permission::SetOut(stop) if alone(stop))
             });
     fault "range-not-counted" ["ORD-CANCEL-16"] "Drives to the exact place of a first node in whose range it stands."
@@ -103,7 +61,7 @@ records! {
     fault "far-order-accepted" ["ORD-FLOW-04"] "Drives to the first node of an order however far it is."
         => overlooking(|_, what| matches!(what, Objection::Far));
     fault "far-order-taken-after-cancel" ["ORD-FLOW-04"] "After a cancellation it accepts a new order wherever its first node is, and drives there."
-        => overlooking(|agv, what| matches!(what, Objection::Far) && agv.book.cancelled);
+        => overlooking(|agv, what| matches!(what, Objection::Far) && agv.order.cancelled);
     fault "horizon-demanded" ["ORD-10"] "Refuses new orders without a horizon."
         => objecting(|_, order, relation| {
             let bare = relation == Relation::New && order.nodes.iter().all(|node| node.released);
@@ -127,25 +85,25 @@ records! {
     fault "free-action-ignored" ["ORD-FLOW-02"] "Takes over a new order while an action of the old one runs that does not block."
         => forbidding(|_, what| matches!(what, Permission::Count(action) if action.request.blocking == Blocking::None));
     fault "trigger-not-counted" ["ORD-FLOW-02"] "It accepts a new order while a waitForTrigger on the last node of its order still runs."
-        => forbidding(|_, what| matches!(what, Permission::Count(action) if is(action, Deed::WaitForTrigger)));
+        => forbidding(|_, what| matches!(what, Permission::Count(action) if is(action, Effect::WaitForTrigger)));
     fault "horizon-not-busy" ["ORD-FLOW-03"] "Takes over a new order while it waits at the decision point."
         => forbidding(|_, what| matches!(what, Permission::CountNode(stop) if !stop.node.released));
     fault "new-order-taken-in-pause" ["ORD-FLOW-01", "ACT-14"] "While it is paused it replaces its unfinished order by a new one."
         => overlooking(|agv, what| matches!(what, Objection::Busy) && agv.holds.pause);
     fault "failed-action-blocks-next-order" ["ORD-FLOW-06", "ORD-FLOW-02"] "It counts a FAILED action of the completed order as unfinished and refuses every following new order."
         => objecting(|agv, _, relation| {
-            let failed = relation == Relation::New && !agv.book.cancelled && has_failed(agv);
+            let failed = relation == Relation::New && !agv.order.cancelled && has_failed(agv);
             failed.then(|| busy("an action of the order before is not finished"))
         });
     fault "dead-after-cancel" ["ORD-CANCEL-13"] "Refuses every new order after a cancellation."
         => objecting(|agv, _, relation| {
-            let dead = relation == Relation::New && agv.book.cancelled;
+            let dead = relation == Relation::New && agv.order.cancelled;
             dead.then(|| busy("the cancelled order is still there"))
         });
     fault "order-after-init-position-refused" ["ORD-04"] "It refuses the first order after an initPosition as too far away, although it stands on the first node."
         => keep::<bool>()
             .ends(|posed, _, action, outcome| {
-                *posed |= is(action, Deed::InitPosition) && !action.of_order() && matches!(outcome, Outcome::Done(_));
+                *posed |= is(action, Effect::InitPosition) && !action.of_order() && matches!(outcome, Outcome::Done(_));
                 outcome
             })
             .refuses(|posed, _, _, _| *posed = false)
@@ -167,14 +125,14 @@ records! {
     fault "failed-actions-outlive-order" ["ORD-FLOW-05", "STATE-MSG-11"] "FAILED actions of the order before stay in actionStates when a new order is accepted."
         => forbidding(|_, what| matches!(what, Permission::Forget(action) if action.of_order() && action.status == Status::Failed));
     fault "cancel-outlives-order" ["STATE-MSG-11"] "An ended cancelOrder stays in its action states when a new order is accepted."
-        => forbidding(|_, what| matches!(what, Permission::Forget(action) if is(action, Deed::CancelOrder) && !action.of_order()));
+        => forbidding(|_, what| matches!(what, Permission::Forget(action) if is(action, Effect::CancelOrder) && !action.of_order()));
     fault "running-instant-dropped" ["STATE-MSG-11"] "Removes running instant actions from its states when a new order is accepted."
         => letting(|_, what| matches!(what, Permission::Forget(_)));
     fault "never-starts" ["ORD-FLOW-07", "ORD-06"] "Accepts an order and does not begin to drive."
         => forbidding(|_, what| matches!(what, Permission::SetOut(_)));
     fault "order-after-cancel-not-driven" ["ORD-CANCEL-13", "ORD-FLOW-07"] "The first order after a cancelled one is accepted but never driven."
         => parked().adopts(|parked, agv, adoption| {
-            *parked = if adoption.update { *parked } else { agv.book.cancelled };
+            *parked = if adoption.update { *parked } else { agv.order.cancelled };
             true
         });
     fault "order-in-pause-never-starts" ["ORD-FLOW-07", "ACT-18"] "An order that was accepted while the vehicle is paused is not driven after the pause either."
@@ -190,22 +148,22 @@ records! {
         });
     fault "update-ids-compared-across-orders" ["ORD-FLOW-06", "ORD-04", "ORD-13"] "Refuses a new order whose orderUpdateId is lower than that of the last order."
         => objecting(|agv, order, relation| {
-            let lower = relation == Relation::New && order.update_id < agv.book.update_id;
+            let lower = relation == Relation::New && order.update_id < agv.order.update_id;
             lower.then(|| Refusal::new(Rule::Outdated, "the order update is older than the current one"))
         });
     fault "update-id-carried-over" ["ORD-FLOW-06", "STATE-12"] "Reports a new order with the orderUpdateId of the last one."
         => keep::<Option<u32>>()
             .adopts(|last, agv, adoption| {
                 if !adoption.update {
-                    *last = agv.book.has_order().then_some(agv.book.update_id);
+                    *last = agv.order.has_order().then_some(agv.order.update_id);
                 }
                 true
             })
             .happens(|last, agv, event| if event == Event::Begun && let Some(last) = *last {
-                agv.book.update_id = last;
+                agv.order.update_id = last;
             });
     fault "first-update-id-zeroed" ["ORD-FLOW-06", "STATE-MSG-02"] "It reports orderUpdateId 0 for every new order, also if it was sent with another one."
-        => when(Event::Begun, |agv| agv.book.update_id = 0);
+        => when(Event::Begun, |agv| agv.order.update_id = 0);
     fault "header-id-counts-orders" ["HDR-02"] "It counts every order message that it receives in the headerId of its states, which therefore jumps."
         => plain().hears(|(), agv, name, _| {
             if name == "order" {
@@ -239,7 +197,7 @@ records! {
         => objecting(|_, _, relation| (relation == Relation::Known).then(|| Refusal::new(Rule::Duplicate, "the order was received before")));
     fault "resend-after-completion-raises-error" ["ORD-REJ-13"] "It ignores an identical re-send while the order runs, but reports an error for it once the order is completed."
         => objecting(|agv, _, relation| {
-            let done = relation == Relation::Known && !agv.is_busy() && !agv.book.cancelled;
+            let done = relation == Relation::Known && !agv.is_busy() && !agv.order.cancelled;
             done.then(|| Refusal::new(Rule::Duplicate, "the order was received before"))
         });
     fault "changed-duplicate-reported" ["ORD-REJ-13"] "It raises an error when an order with the same orderId and orderUpdateId comes again with other content."
@@ -256,7 +214,7 @@ records! {
     fault "duplicate-executed" ["ORD-REJ-13"] "Begins an order again when it is sent twice."
         => letting(|agv, what| matches!(what, Permission::BeginAgain) && !agv.is_busy());
     fault "duplicate-after-cancel-executed" ["ORD-REJ-13"] "It executes a cancelled order once more when the same message comes again."
-        => letting(|agv, what| matches!(what, Permission::BeginAgain) && agv.book.cancelled);
+        => letting(|agv, what| matches!(what, Permission::BeginAgain) && agv.order.cancelled);
     fault "duplicate-halts-driving" ["ORD-06", "ORD-REJ-13"] "Stands still for ever when the order it drives is sent again."
         => parked().happens(|parked, agv, event| *parked = match event {
             Event::SeenAgain => *parked || agv.is_busy(),
@@ -266,7 +224,7 @@ records! {
     fault "duplicate-clears-errors" ["ORD-REJ-08", "ORD-REJ-03"] "An order it knows already, sent again, clears its order errors as an accepted new order would."
         => when(Event::SeenAgain, |agv| agv.errors.new_order());
     fault "duplicate-repeats-actions" ["ORD-REJ-13", "ASTATE-06"] "The running order sent again makes it repeat the finished actions of the node it was on last."
-        => when(Event::SeenAgain, |agv| if agv.is_busy() { agv.repeat_actions(agv.book.last_sequence) });
+        => when(Event::SeenAgain, |agv| if agv.is_busy() { agv.repeat_actions(agv.order.last_sequence) });
     fault "duplicate-releases-horizon" ["ORD-07", "ORD-REJ-13"] "When the same order comes again while the vehicle waits at the decision point it drives on into its horizon."
         => unbound().happens(|unbound, agv, event| *unbound = match event {
             Event::SeenAgain => *unbound || agv.waits_at_decision_point(),
@@ -282,21 +240,21 @@ records! {
             Objection::Action(asked, Lack::Id) => agv.actions.get(&asked.request.id).is_some_and(Action::of_order),
             _ => false,
         });
-    liberty "first-node-listed" ["NODE-03", "STATE-12"] "Lists the first node of an order until it sets out from it."
+    tolerance "first-node-listed" ["NODE-03", "STATE-12"] "Lists the first node of an order until it sets out from it."
         => when(Event::Begun, |agv| if agv.motion.reached { linger(agv, 100) });
-    liberty "sets-out-late" ["ORD-FLOW-07", "ORD-FLOW-06"] "It stands for most of a second, with the first node listed, before it begins a new order."
+    tolerance "sets-out-late" ["ORD-FLOW-07", "ORD-FLOW-06"] "It stands for most of a second, with the first node listed, before it begins a new order."
         => when(Event::Begun, |agv| linger(agv, 700));
-    liberty "lib-thinks-before-driving" ["ORD-FLOW-07"] "It plans for two or three seconds after it has accepted an order before it starts to drive."
+    tolerance "lib-thinks-before-driving" ["ORD-FLOW-07"] "It plans for two or three seconds after it has accepted an order before it starts to drive."
         => when(Event::Begun, |agv| linger(agv, 2_500));
-    liberty "adopts-before-driving" ["STATE-11", "STATE-03"] "The vehicle reports the adoption of an order or update in a state of its own, and its start in the next one at the same time."
+    tolerance "adopts-before-driving" ["STATE-11", "STATE-03"] "The vehicle reports the adoption of an order or update in a state of its own, and its start in the next one at the same time."
         => plain().happens(|(), agv, event| if matches!(event, Event::Begun | Event::Updated) { agv.flush() });
-    liberty "nonzero-first-update-id-refused" ["ORD-FLOW-06"] "It rejects a new order whose orderUpdateId is not 0."
+    tolerance "nonzero-first-update-id-refused" ["ORD-FLOW-06"] "It rejects a new order whose orderUpdateId is not 0."
         => objecting(|_, order, relation| {
             let reason = "a new order begins with orderUpdateId 0";
             let other = relation == Relation::New && order.update_id != 0;
             other.then(|| Refusal::at_field(Rule::Unable, reason, "orderUpdateId"))
         });
-    liberty "duplicate-noted-in-information" ["ORD-REJ-13", "INFO-01"] "It mentions an order that came twice in an information entry, without an error."
+    tolerance "duplicate-noted-in-information" ["ORD-REJ-13", "INFO-01"] "It mentions an order that came twice in an information entry, without an error."
         => keep::<bool>()
             .happens(|again, _, event| *again = match event {
                 Event::SeenAgain => true,
@@ -305,12 +263,12 @@ records! {
             })
             .says(|again, agv, part, m| {
                 if *again && matches!(part, Part::State) {
-                    let references = json!([{ "referenceKey": "orderId", "referenceValue": agv.book.order_id }]);
+                    let references = json!([{ "referenceKey": "orderId", "referenceValue": agv.order.order_id }]);
                     m.add("information", json!({ "infoType": "orderReceivedAgain", "infoLevel": "DEBUG", "infoReferences": references }));
                 }
                 true
             });
-    liberty "orders-spaced" ["FACT-13"] "States a minOrderInterval of a quarter of a second, and overlooks an order that comes earlier."
+    tolerance "orders-spaced" ["FACT-13"] "States a minOrderInterval of a quarter of a second, and overlooks an order that comes earlier."
         => keep::<Option<Moment>>().hears(|before, agv, name, _| {
             if name != "order" {
                 return true;
@@ -325,7 +283,7 @@ records! {
             }
             true
         });
-    liberty "own-error-names" ["ORD-FLOW-01", "MAP-08", "ORD-REJ-15"] "It has names of its own for errors that the standard does not name."
+    tolerance "own-error-names" ["ORD-FLOW-01", "MAP-08", "ORD-REJ-15"] "It has names of its own for errors that the standard does not name."
         => refusal(|_, rule, _, e| {
             let own = match rule {
                 Rule::Memory => Some("insufficientMemory"),
@@ -336,35 +294,35 @@ records! {
             e.error_type = own.map_or_else(|| e.error_type.clone(), str::to_owned);
             true
         });
-    liberty "outdated-error-brief" ["ORD-REJ-12", "STATE-05"] "It reports an outdated update in one state and takes the warning back at once."
+    tolerance "outdated-error-brief" ["ORD-REJ-12", "STATE-05"] "It reports an outdated update in one state and takes the warning back at once."
         => refusal(|agv, rule, _, e| {
             if rule == Rule::Outdated {
                 e.life = Life::Until(agv.moment() + brief(agv));
             }
             true
         });
-    liberty "outdated-update-warning-until-next-order" ["ORD-REJ-12", "ERR-01"] "It keeps orderUpdateError in its errors until it accepts a new order."
+    tolerance "outdated-update-warning-until-next-order" ["ORD-REJ-12", "ERR-01"] "It keeps orderUpdateError in its errors until it accepts a new order."
         => refusal(|_, rule, _, e| {
             if rule == Rule::Outdated {
                 e.life = Life::UntilNewOrder;
             }
             true
         });
-    liberty "culprit-as-json-path" ["ORD-REJ-07", "BP-02"] "It names the wrong field of a refused order as a JSONPath under the key jsonPath."
+    tolerance "culprit-as-json-path" ["ORD-REJ-07", "BP-02"] "It names the wrong field of a refused order as a JSONPath under the key jsonPath."
         => refusal(|_, _, _, e| {
             for (key, value) in e.references.iter_mut().filter(|(key, _)| key == "field") {
                 (*key, *value) = ("jsonPath".to_owned(), format!("$.{value}"));
             }
             true
         });
-    liberty "references-name-all-nodes" ["BP-02", "ORD-REJ-07"] "It references every nodeId of a refused order, so that a referenceKey occurs several times."
+    tolerance "references-name-all-nodes" ["BP-02", "ORD-REJ-07"] "It references every nodeId of a refused order, so that a referenceKey occurs several times."
         => refusal(|_, _, message, e| {
             let nodes = message.get("nodes").and_then(Value::as_array).into_iter().flatten();
             let ids = nodes.filter_map(|node| node.get("nodeId")?.as_str()).take(20);
             e.references.extend(ids.map(|id| ("nodeId".to_owned(), id.chars().take(256).collect())));
             true
         });
-    liberty "refusal-in-two-errors" ["ORD-REJ-17", "ERR-01"] "It adds a warning orderRejected with the same references to every warning about a refused order."
+    tolerance "refusal-in-two-errors" ["ORD-REJ-17", "ERR-01"] "It adds a warning orderRejected with the same references to every warning about a refused order."
         => refusal(|agv, _, _, e| {
             agv.errors.raise(ActiveError {
                 error_type: "orderRejected".to_owned(),

@@ -1,35 +1,6 @@
 //! Deviations of what holds the vehicle: pause, buttons and the protective field (section 6.8 and ACT-11 to ACT-18).
 
-use super::hooks::Object;
-use super::hooks::drives;
-use super::hooks::forbidding;
-use super::hooks::heedless;
-use super::hooks::holding;
-use super::hooks::instead;
-use super::hooks::is;
-use super::hooks::keep;
-use super::hooks::letting;
-use super::hooks::lifts_pause;
-use super::hooks::plain;
-use super::hooks::unbound;
-use super::hooks::when;
-use crate::agv::Agv;
-use crate::agv::action_kinds::Deed;
-use crate::agv::actions::Action;
-use crate::agv::actions::Origin;
-use crate::agv::actions::Status;
-use crate::agv::deeds::Outcome;
-use crate::agv::deeds::Problem;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Hindrance;
-use crate::agv::seam::Part;
-use crate::agv::seam::Permission;
-use crate::agv::seam::Span;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use std::time::Duration;
-use tck_base::clock::Moment;
+use super::prelude::*;
 
 records! {
     fault "pause-stuck-after-cut" ["ACT-13"] "Reports stopPause FINISHED and stays paused when the link was lost in the pause."
@@ -37,23 +8,23 @@ records! {
             .happens(|stuck, agv, event| *stuck |= event == Event::ConnectionLost && agv.holds.pause)
             .does(|stuck, agv, action| stays_paused(*stuck, agv, action));
     fault "pause-twice-fails" ["ACT-11"] "Fails a startPause while it is paused."
-        => instead(Deed::StartPause, |agv, action| {
+        => instead(Effect::StartPause, |agv, action| {
             let again = agv.holds.pause && !agv.pause_blocked;
             again.then(|| Outcome::Failed(Problem::unable(action, "the vehicle is paused already")))
         });
     fault "pauses-counted" ["ACT-13", "ACT-11"] "Counts its pauses, and ends them only with as many stopPause."
         => keep::<u32>().does(|pauses, agv, action| {
-            if is(action, Deed::StartPause) && !agv.pause_blocked {
+            if is(action, Effect::StartPause) && !agv.pause_blocked {
                 *pauses += 1;
             }
-            if is(action, Deed::StopPause) && lifts_pause(agv) {
+            if is(action, Effect::StopPause) && lifts_pause(agv) {
                 *pauses = pauses.saturating_sub(1);
                 return (*pauses > 0).then_some(Outcome::Done(None));
             }
             None
         });
     fault "second-start-pause-resumes" ["ACT-11", "ACT-13"] "It treats startPause as a toggle: a second startPause ends the pause."
-        => instead(Deed::StartPause, |agv, _| {
+        => instead(Effect::StartPause, |agv, _| {
             let again = agv.holds.pause && !agv.pause_blocked;
             again.then(|| {
                 agv.set_holds(|holds| holds.pause = false);
@@ -61,19 +32,19 @@ records! {
             })
         });
     fault "pause-fails-without-order" ["ACT-13", "ACT-11"] "It answers startPause with FAILED when it has no order."
-        => instead(Deed::StartPause, |agv, action| {
-            let idle = agv.book.nodes.is_empty() && !agv.actions.order_unfinished();
+        => instead(Effect::StartPause, |agv, action| {
+            let idle = agv.order.nodes.is_empty() && !agv.actions.order_unfinished();
             idle.then(|| Outcome::Failed(Problem::unable(action, "there is no order to pause")))
         });
     fault "stop-pause-idle-fails" ["ACT-11"] "Fails a stopPause while it is not paused."
-        => instead(Deed::StopPause, |agv, action| {
+        => instead(Effect::StopPause, |agv, action| {
             let idle = !agv.holds.pause;
             idle.then(|| Outcome::Failed(Problem::unable(action, "the vehicle is not paused")))
         });
     fault "pause-drives-on" ["ACT-12", "ACT-15"] "Drives to the next node before it pauses."
-        => drives(Hindrance::Hold, |agv| agv.book.entered && agv.holds.pause);
+        => drives(Hindrance::Hold, |agv| agv.order.entered && agv.holds.pause);
     fault "pause-drops-order" ["ACT-14"] "Gives the order up when it is paused."
-        => instead(Deed::StartPause, |agv, _| {
+        => instead(Effect::StartPause, |agv, _| {
             if !agv.pause_blocked {
                 agv.give_up_order();
             }
@@ -82,7 +53,7 @@ records! {
     fault "pause-not-lifted" ["ACT-18"] "Reports the end of a pause and does not drive on."
         => keep::<bool>()
             .does(|stuck, agv, action| {
-                let lifted = is(action, Deed::StopPause) && lifts_pause(agv) && agv.holds.pause;
+                let lifted = is(action, Effect::StopPause) && lifts_pause(agv) && agv.holds.pause;
                 lifted.then(|| {
                     *stuck = true;
                     agv.holds.pause = false;
@@ -97,15 +68,15 @@ records! {
         => forbidding(|_, what| matches!(what, Permission::HeedSwitch));
     fault "blocked-pause-taken" ["ACT-16"] "Pauses and goes on by message although it says that it cannot."
         => plain().does(|(), agv, action| {
-            if agv.pause_blocked && (is(action, Deed::StartPause) || is(action, Deed::StopPause)) {
-                agv.set_holds(|holds| holds.pause = is(action, Deed::StartPause));
+            if agv.pause_blocked && (is(action, Effect::StartPause) || is(action, Effect::StopPause)) {
+                agv.set_holds(|holds| holds.pause = is(action, Effect::StartPause));
             }
             None
         });
     fault "pause-cuts-horizon" ["ACT-14", "STATE-12"] "A startPause makes it throw away the horizon of its order."
-        => instead(Deed::StartPause, |agv, _| {
+        => instead(Effect::StartPause, |agv, _| {
             if !agv.pause_blocked {
-                let gone = agv.book.drop_horizon();
+                let gone = agv.order.drop_horizon();
                 agv.actions.retain(|action| match action.origin {
                     Origin::Node(id) | Origin::Edge(id) => !gone.contains(&id),
                     Origin::Instant => true,
@@ -116,7 +87,7 @@ records! {
     fault "pause-finished-before-standing" ["ACT-15", "ACT-12"] "It reports startPause FINISHED while it still rolls for a second."
         => keep::<Option<Moment>>()
             .does(|braking, agv, action| {
-                if is(action, Deed::StartPause) && !agv.pause_blocked && agv.motion.is_moving() {
+                if is(action, Effect::StartPause) && !agv.pause_blocked && agv.motion.is_moving() {
                     *braking = Some(agv.moment() + Duration::from_secs(1));
                 }
                 None
@@ -130,11 +101,11 @@ records! {
                 let rolls = braking.is_some() && holds.pause && !stopped;
                 usual || rolls && matches!(what, Permission::DriveAgainst(Hindrance::Hold))
             })
-            .due(|braking| *braking);
+            .due(|braking, _| *braking);
     fault "paused-flag-late" ["ACT-13"] "The flag paused becomes true only one and a half seconds after startPause is FINISHED."
         => keep::<Option<Moment>>()
             .does(|hidden, agv, action| {
-                if is(action, Deed::StartPause) && !agv.pause_blocked && !agv.holds.pause {
+                if is(action, Effect::StartPause) && !agv.pause_blocked && !agv.holds.pause {
                     *hidden = Some(agv.moment() + Duration::from_millis(1_500));
                 }
                 None
@@ -148,9 +119,9 @@ records! {
                 }
                 true
             })
-            .due(|hidden| *hidden);
+            .due(|hidden, _| *hidden);
     fault "pause-forgets-queue" ["ACT-14", "ACT-18"] "Actions that wait behind another one on their node are never begun when the vehicle was paused in the meantime."
-        => instead(Deed::StopPause, |agv, _| {
+        => instead(Effect::StopPause, |agv, _| {
             if lifts_pause(agv) && agv.holds.pause {
                 agv.actions.drop_lists();
             }
@@ -212,7 +183,7 @@ records! {
                 _ => {}
             })
             .allows(|(places, _), _, what, usual| usual && (places.is_empty() || !matches!(what, Permission::Drive)))
-            .due(|(_, due)| *due);
+            .due(|(_, due), _| *due);
     fault "paused-actions-stay-paused" ["ACT-18"] "It leaves actions PAUSED that were held by a pause after stopPause."
         => forbidding(|_, what| matches!(what, Permission::ResumeActions(before) if before.pause));
     fault "field-does-not-pause" ["ACT-34"] "Goes on with its actions while its protective field is violated." because "It breaks a recommendation only."
@@ -223,9 +194,9 @@ records! {
         => latched(|agv, event| event == Event::Releasing && agv.holds.emergency, |m| m.part("safetyState", |safety| safety.set("eStop", "MANUAL")));
     fault "field-violation-latched" ["STATE-MSG-17"] "After the safety field is free again fieldViolation stays true until the next order."
         => latched(|agv, event| event == Event::FieldFreed && agv.holds.field, |m| m.part("safetyState", |safety| safety.set("fieldViolation", true)));
-    liberty "actions-run-on-in-pause" ["ACT-15", "ACT-18"] "Running actions go on while it is paused by startPause."
+    tolerance "actions-run-on-in-pause" ["ACT-15", "ACT-18"] "Running actions go on while it is paused by startPause."
         => forbidding(|agv, what| matches!(what, Permission::HoldActions) && agv.holds.pause && !agv.holds.button && !agv.holds.emergency && !agv.holds.field);
-    liberty "resumes-in-a-moment" ["ASTATE-04", "ACT-18"] "Lets held actions go on half a second after the pause has ended."
+    tolerance "resumes-in-a-moment" ["ASTATE-04", "ACT-18"] "Lets held actions go on half a second after the pause has ended."
         => keep::<Option<Moment>>()
             .happens(|due, agv, event| match event {
                 Event::Resuming => *due = Some(agv.moment() + Duration::from_millis(500)),
@@ -233,10 +204,10 @@ records! {
                 _ => {}
             })
             .allows(|_, _, what, usual| usual && !matches!(what, Permission::ResumeActions(_)))
-            .due(|due| *due);
-    liberty "brakes-long-on-pause" ["ACT-12", "ACT-13"] "It needs two seconds to come to a stop after startPause and reports it RUNNING meanwhile."
+            .due(|due, _| *due);
+    tolerance "brakes-long-on-pause" ["ACT-12", "ACT-13"] "It needs two seconds to come to a stop after startPause and reports it RUNNING meanwhile."
         => keep::<bool>()
-            .allows(|_, agv, what, usual| usual || matches!(what, Permission::TakeTime(action) if is(action, Deed::StartPause) && agv.motion.is_moving()))
+            .allows(|_, agv, what, usual| usual || matches!(what, Permission::TakeTime(action) if is(action, Effect::StartPause) && agv.motion.is_moving()))
             .happens(|braking, agv, event| match event {
                 // The rest of the leg is planned anew, slowly.
                 Event::InstantBegun if pauses_next(agv) && agv.motion.is_moving() => {
@@ -246,7 +217,7 @@ records! {
                 _ => {}
             })
             .does(|braking, agv, action| {
-                if is(action, Deed::StartPause) && std::mem::take(braking) {
+                if is(action, Effect::StartPause) && std::mem::take(braking) {
                     agv.motion.halt(agv.moment());
                 }
                 None
@@ -254,22 +225,22 @@ records! {
             .plans(|braking, _, leg| if *braking {
                 leg.own /= 20.0;
             })
-            .lasts(|_, what, usual| match what {
-                Span::Action(action) if is(action, Deed::StartPause) => Duration::from_secs(2),
+            .lasts(|_, _, what, usual| match what {
+                Span::Action(action) if is(action, Effect::StartPause) => Duration::from_secs(2),
                 _ => usual,
             });
-    liberty "pause-takes-time" ["ACT-12", "ACT-15", "ACT-41"] "startPause and stopPause are RUNNING for a moment, in which the vehicle goes on as before, and then FINISHED."
-        => letting(|_, what| matches!(what, Permission::TakeTime(action) if is(action, Deed::StartPause) || is(action, Deed::StopPause)));
+    tolerance "pause-takes-time" ["ACT-12", "ACT-15", "ACT-41"] "startPause and stopPause are RUNNING for a moment, in which the vehicle goes on as before, and then FINISHED."
+        => letting(|_, what| matches!(what, Permission::TakeTime(action) if is(action, Effect::StartPause) || is(action, Effect::StopPause)));
 }
 
 /// Whether something that ends a pause by message ends it.
 pub(super) fn stays_paused(stuck: bool, agv: &Agv, action: &Action) -> Option<Outcome> {
-    (stuck && is(action, Deed::StopPause) && lifts_pause(agv)).then_some(Outcome::Done(None))
+    (stuck && is(action, Effect::StopPause) && lifts_pause(agv)).then_some(Outcome::Done(None))
 }
 
 /// Whether an action is about to end a pause.
 fn ends_pause(agv: &Agv, action: &Action) -> bool {
-    is(action, Deed::StopPause) && lifts_pause(agv) && agv.holds.pause
+    is(action, Effect::StopPause) && lifts_pause(agv) && agv.holds.pause
 }
 
 type Latching = fn(&Agv, Event) -> bool;
@@ -292,5 +263,5 @@ fn pauses_next(agv: &Agv) -> bool {
         .actions
         .iter()
         .filter(|action| !action.of_order() && action.status == Status::Waiting);
-    waiting.last().is_some_and(|action| is(action, Deed::StartPause))
+    waiting.last().is_some_and(|action| is(action, Effect::StartPause))
 }

@@ -1,29 +1,9 @@
 //! Deviations of downloads and of finding its position (section 6.7 and ACT-23 to ACT-25).
 
-use super::hooks::after;
-use super::hooks::forbidding;
-use super::hooks::instead;
-use super::hooks::is;
-use super::hooks::keep;
-use super::hooks::succeeded;
-use super::hooks::when;
 use crate::Output;
-use crate::agv::Agv;
-use crate::agv::action_kinds::Deed;
-use crate::agv::actions::Action;
-use crate::agv::actions::Status;
-use crate::agv::deeds::Outcome;
-use crate::agv::deeds::Problem;
 use crate::agv::motion::Pose;
-use crate::agv::seam::Cause;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Part;
-use crate::agv::seam::Permission;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use std::time::Duration;
-use tck_base::clock::Moment;
+
+use super::prelude::*;
 
 records! {
     fault "manual-enable-unreported" ["MAP-26", "STATE-10"] "Does not report a map enabled on the vehicle."
@@ -38,7 +18,7 @@ records! {
         => keep::<Option<String>>()
             .raises(|map, agv, cause, _| {
                 if let Cause::Failure(Some(action)) = cause
-                    && is(action, Deed::InitPosition)
+                    && is(action, Effect::InitPosition)
                     && !agv.maps.on_board(action.text("mapId"))
                 {
                     *map = Some(action.text("mapId").to_owned());
@@ -55,27 +35,27 @@ records! {
                 true
             });
     fault "init-position-unchecked" ["ACT-25"] "Takes over a pose on a map it does not have."
-        => instead(Deed::InitPosition, |agv, action| {
-            let idle = action.of_order() || agv.book.nodes.is_empty() && !agv.actions.order_unfinished();
+        => instead(Effect::InitPosition, |agv, action| {
+            let idle = action.of_order() || agv.order.nodes.is_empty() && !agv.actions.order_unfinished();
             idle.then(|| take_pose(agv, action)).flatten()
         });
     fault "init-position-any-map" ["ACT-25"] "It reports initPosition FINISHED for a map that it does not have."
-        => instead(Deed::InitPosition, |agv, action| {
-            let idle = action.of_order() || agv.book.nodes.is_empty() && !agv.actions.order_unfinished();
+        => instead(Effect::InitPosition, |agv, action| {
+            let idle = action.of_order() || agv.order.nodes.is_empty() && !agv.actions.order_unfinished();
             let unknown = !agv.maps.on_board(action.text("mapId"));
             (idle && unknown).then(|| take_pose(agv, action)).flatten()
         });
-    liberty "init-position-resets-sequence" ["ACT-24", "STATE-MSG-04"] "An initPosition sets its lastNodeSequenceId to 0."
-        => succeeded(Deed::InitPosition, |agv, action| if !action.of_order() {
-            agv.book.last_sequence = 0;
+    tolerance "init-position-resets-sequence" ["ACT-24", "STATE-MSG-04"] "An initPosition sets its lastNodeSequenceId to 0."
+        => succeeded(Effect::InitPosition, |agv, action| if !action.of_order() {
+            agv.order.last_sequence = 0;
         });
-    liberty "enabled-unused-map-not-deleted" ["MAP-29", "MAP-32"] "It refuses to delete a map that is enabled though neither its position nor its order needs it."
-        => instead(Deed::DeleteMap, |agv, action| {
+    tolerance "enabled-unused-map-not-deleted" ["MAP-29", "MAP-32"] "It refuses to delete a map that is enabled though neither its position nor its order needs it."
+        => instead(Effect::DeleteMap, |agv, action| {
             let enabled = agv.maps.is_enabled(action.text("mapId"), action.text("mapVersion"));
             enabled.then(|| Outcome::Failed(Problem::map(action, "the map is in use")))
         });
-    liberty "map-delisted-next" ["MAP-29"] "It removes the entry of a deleted map in the state after the one that reports the deleteMap FINISHED."
-        => instead(Deed::DeleteMap, |agv, action| {
+    tolerance "map-delisted-next" ["MAP-29"] "It removes the entry of a deleted map in the state after the one that reports the deleteMap FINISHED."
+        => instead(Effect::DeleteMap, |agv, action| {
             let before = agv.maps.clone();
             match agv.delete_map(action) {
                 Ok(()) => {
@@ -88,22 +68,22 @@ records! {
                 refused => Some(refused.into()),
             }
         });
-    liberty "map-listed-next" ["MAP-20", "MAP-21"] "It lists a downloaded map in the state after the one that reports the downloadMap FINISHED."
+    tolerance "map-listed-next" ["MAP-20", "MAP-21"] "It lists a downloaded map in the state after the one that reports the downloadMap FINISHED."
         => when(Event::Downloaded, |agv| {
             downloads(agv, Status::Finished);
             agv.flush();
         });
-    liberty "download-runs-at-once" ["MAP-17"] "It reports a downloadMap RUNNING as soon as it asks for the file, without INITIALIZING."
-        => after(Deed::DownloadMap, |agv, action, outcome| {
+    tolerance "download-runs-at-once" ["MAP-17"] "It reports a downloadMap RUNNING as soon as it asks for the file, without INITIALIZING."
+        => after(Effect::DownloadMap, |agv, action, outcome| {
             if matches!(outcome, Outcome::Open) && let Some(action) = agv.actions.get_mut(&action.request.id) {
                 action.status = Status::Running;
             }
             outcome
         });
-    liberty "lib-download-queued" ["MAP-17"] "It shows downloadMap INITIALIZING for some seconds before the download starts."
+    tolerance "lib-download-queued" ["MAP-17"] "It shows downloadMap INITIALIZING for some seconds before the download starts."
         => keep::<Vec<(Moment, Output)>>()
             .ends(|waiting, agv, action, outcome| {
-                if is(action, Deed::DownloadMap) && matches!(outcome, Outcome::Open) {
+                if is(action, Effect::DownloadMap) && matches!(outcome, Outcome::Open) {
                     let due = agv.moment() + Duration::from_secs(3);
                     let (fetches, others): (Vec<Output>, Vec<Output>) = std::mem::take(&mut agv.pending).into_iter().partition(|output| matches!(output, Output::Fetch { .. }));
                     agv.pending = others;
@@ -123,15 +103,15 @@ records! {
                 }
                 _ => {}
             })
-            .due(|waiting| waiting.iter().map(|(due, _)| *due).min());
-    liberty "loads-identified" ["STATE-MSG-07"] "It reads the loadId of a picked load itself where the order does not name one."
+            .due(|waiting, _| waiting.iter().map(|(due, _)| *due).min());
+    tolerance "loads-identified" ["STATE-MSG-07"] "It reads the loadId of a picked load itself where the order does not name one."
         => keep::<String>()
             .does(|site, agv, action| {
                 *site = agv.site(action);
                 None
             })
             .ends(|site, agv, action, outcome| {
-                let unnamed = is(action, Deed::Pick) && action.request.parameter("loadId").is_none();
+                let unnamed = is(action, Effect::Pick) && action.request.parameter("loadId").is_none();
                 if unnamed && matches!(outcome, Outcome::Done(_)) {
                     agv.loads.iter_mut().for_each(|load| load.id = format!("RFID-{site}"));
                 }
@@ -141,7 +121,7 @@ records! {
 
 /// What becomes of downloads that run.
 fn downloads(agv: &mut Agv, status: Status) {
-    let of_maps = |action: &&mut Action| is(action, Deed::DownloadMap) && action.status.is_active();
+    let of_maps = |action: &&mut Action| is(action, Effect::DownloadMap) && action.status.is_active();
     for action in agv.actions.iter_mut().filter(of_maps) {
         action.status = status;
     }

@@ -1,11 +1,7 @@
 //! Deviations of how an order is read: what should be refused is guessed, what is right is not understood
 //! (section 6.6.4, ORD-REJ-01).
 
-use super::hooks::{Object, reading};
-use crate::agv::seam::Deviation;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::{Value, json};
+use super::prelude::*;
 
 const WHOLE: [&str; 3] = ["headerId", "orderUpdateId", "sequenceId"];
 const REAL: [&str; 11] = [
@@ -41,7 +37,7 @@ const TEXTS: [&str; 12] = [
 records! {
     fault "released-assumed" ["ORD-REJ-01"] "Takes nodes and edges that do not say whether they are released for released ones."
         => reading(|_, order| elements(order, |element| {
-            element.entry("released").or_insert(json!(true));
+            element.supply("released", json!(true));
         }));
     fault "text-read-as-number" ["ORD-REJ-01"] "Takes numbers and Booleans that are written as text."
         => reading(|_, order| members(order, &|key, value| {
@@ -69,7 +65,7 @@ records! {
         }));
     fault "blocking-type-assumed" ["ORD-REJ-01", "ORD-REJ-02"] "It takes an order with an action without blockingType, and assumes NONE."
         => reading(|_, order| elements(order, |element| element.each("actions", |action| {
-            action.entry("blockingType").or_insert(json!("NONE"));
+            action.supply("blockingType", json!("NONE"));
         })));
     fault "missing-list-read-as-empty" ["ORD-REJ-01"] "Takes a list that is missing for an empty one."
         => reading(|_, order| {
@@ -77,7 +73,7 @@ records! {
                 order.entry(list).or_insert(json!([]));
             }
             elements(order, |element| {
-                element.entry("actions").or_insert(json!([]));
+                element.supply("actions", json!([]));
             });
         });
     fault "numbers-wrapped" ["ORD-REJ-01"] "Cuts numbers that are no whole numbers of 32 bits until they are."
@@ -121,7 +117,7 @@ records! {
         });
     fault "missing-orientation-type-global" ["ORD-MSG-22"] "It takes the orientation of an edge without orientationType for a global one."
         => reading(|_, order| order.each("edges", |edge| {
-            edge.entry("orientationType").or_insert(json!("GLOBAL"));
+            edge.supply("orientationType", json!("GLOBAL"));
         }));
     fault "surplus-edge-dropped" ["ORD-11"] "An order with more edges than fit between its nodes is taken over; the surplus edges are dropped without a word."
         => reading(|_, order| {

@@ -1,18 +1,10 @@
 //! Deviations of what is reported, and what is changed, when an order is refused or nothing is there to cancel
 //! (sections 6.6.4 and 6.6.3).
 
-use super::hooks::{MOMENT, keep, nothing_to_cancel, parked, refusal, refusing};
-use crate::agv::Agv;
 use crate::agv::action_kinds;
-use crate::agv::actions::{Action, Origin, Status};
-use crate::agv::errors::{ActiveError, Life};
-use crate::agv::order_message::Order;
-use crate::agv::rejection::{Rule, message_references};
-use crate::agv::seam::{Cause, Deviation, Event};
-use crate::deviations::record::Record;
-use serde_json::Value;
-use std::time::Duration;
-use tck_base::clock::Moment;
+use crate::agv::rejection::message_references;
+
+use super::prelude::*;
 
 records! {
     fault "rejection-silent" ["ORD-REJ-17", "ORD-REJ-02", "ORD-REJ-06", "ORD-REJ-12"] "Only logs that it refused an order."
@@ -56,8 +48,8 @@ records! {
         => refusal(|agv, _, _, e| {
             for (key, value) in &mut e.references {
                 match key.as_str() {
-                    "orderId" => value.clone_from(&agv.book.order_id),
-                    "orderUpdateId" => *value = agv.book.update_id.to_string(),
+                    "orderId" => value.clone_from(&agv.order.order_id),
+                    "orderUpdateId" => *value = agv.order.update_id.to_string(),
                     _ => {}
                 }
             }
@@ -65,9 +57,9 @@ records! {
         });
     fault "outdated-update-names-current-id" ["ORD-REJ-14", "BP-01"] "It puts the orderUpdateId it has, not the rejected one, into the references of the rejection."
         => refusal(|agv, _, message, e| {
-            let own = agv.book.has_order() && message.get("orderId").and_then(Value::as_str) == Some(agv.book.order_id.as_str());
+            let own = agv.order.has_order() && message.get("orderId").and_then(Value::as_str) == Some(agv.order.order_id.as_str());
             let ids = e.references.iter_mut().filter(|(key, _)| own && key == "orderUpdateId");
-            ids.for_each(|(_, value)| *value = agv.book.update_id.to_string());
+            ids.for_each(|(_, value)| *value = agv.order.update_id.to_string());
             true
         });
     fault "culprit-unnamed" ["ORD-REJ-07"] "Its orderError references the message alone and not the field or the action that is wrong."
@@ -122,7 +114,7 @@ records! {
         => refusing(|agv, message, rule| if rule != Rule::Outdated { take_id(agv, message) });
     fault "rejected-update-cuts-horizon" ["ORD-FLOW-12", "STATE-12"] "An order update that it rejects still makes it throw away the horizon of its order."
         => refusing(|agv, _, rule| if matches!(rule, Rule::BrokenUpdate | Rule::Outdated) {
-            let gone = agv.book.drop_horizon();
+            let gone = agv.order.drop_horizon();
             agv.actions.retain(|action| match action.origin {
                 Origin::Node(id) | Origin::Edge(id) => !gone.contains(&id),
                 Origin::Instant => true,
@@ -132,7 +124,7 @@ records! {
         => refusing(|agv, message, rule| {
             let id = message.get("orderUpdateId").and_then(Value::as_u64).and_then(|id| u32::try_from(id).ok());
             if let Some(id) = id.filter(|_| rule == Rule::BrokenUpdate) {
-                agv.book.update_id = id;
+                agv.order.update_id = id;
             }
         });
     fault "outdated-halts-driving" ["ORD-REJ-11", "ORD-FLOW-12"] "An outdated update makes it stand still until there is a new order, though it keeps the order it has."
@@ -145,19 +137,19 @@ records! {
             of_order.for_each(|action| action.due = None);
         });
     fault "refused-update-drops-edges" ["ORD-FLOW-12", "STATE-12"] "An order it refuses makes it throw the edges of its horizon away."
-        => refusing(|agv, _, _| agv.book.edges.retain(|edge| edge.released));
+        => refusing(|agv, _, _| agv.order.edges.retain(|edge| edge.released));
     fault "malformed-stops-order" ["ORD-FLOW-12", "ORD-REJ-01"] "Gives its order up when an update breaks the schema."
         => refusing(|agv, message, rule| if rule == Rule::Malformed && message.is_object() { agv.give_up_order() });
     fault "missing-id-taken-over" ["ORD-REJ-01", "STATE-MSG-02"] "Reads a missing orderId as an empty one and reports it."
         => refusing(|agv, message, rule| {
             if rule == Rule::Malformed && message.is_object() && message.get("orderId").is_none() {
-                agv.book.order_id.clear();
+                agv.order.order_id.clear();
             }
         });
     fault "unreadable-clears-order" ["ORD-REJ-01", "ORD-FLOW-12"] "Clears its order when it cannot read a message."
         => refusing(|agv, message, rule| if rule == Rule::Malformed && !message.is_object() {
             agv.give_up_order();
-            agv.book.order_id.clear();
+            agv.order.order_id.clear();
         });
     fault "refused-actions-listed" ["ORD-REJ-09"] "Lists the actions of an order it cannot perform as FAILED."
         => refusing(|agv, message, rule| if rule == Rule::Unable && let Ok(order) = Order::read(message) {
@@ -169,7 +161,7 @@ records! {
         });
     fault "rejected-update-leaves-actions" ["ORD-REJ-09", "ORD-REJ-04", "ORD-FLOW-12"] "It lists the actions of an update before it checks them, so that the actions of a rejected update stay in actionStates as WAITING."
         => refusing(|agv, message, rule| {
-            let order = Order::read(message).ok().filter(|order| rule == Rule::Unable && order.id == agv.book.order_id);
+            let order = Order::read(message).ok().filter(|order| rule == Rule::Unable && order.id == agv.order.order_id);
             for request in order.iter().flat_map(|order| order.actions().skip(order.nodes.first().map_or(0, |joint| joint.actions.len()))) {
                 if agv.actions.get(&request.id).is_none() {
                     let kind = action_kinds::find(&agv.config, &request.action_type);
@@ -191,7 +183,7 @@ records! {
         => refusing(|agv, _, _| agv.set_holds(|holds| holds.pause = false));
     fault "rejection-drops-horizon" ["ORD-FLOW-12", "STATE-12", "ORD-FLOW-03"] "Forgets its horizon when it has to refuse a message."
         => refusing(|agv, _, _| {
-            agv.book.drop_horizon();
+            agv.order.drop_horizon();
         });
     fault "rejection-clears-action-states" ["STATE-MSG-10"] "Removes its finished actions from the states when it has to refuse an order."
         => refusing(|agv, _, _| agv.actions.retain(|action| !action.of_order() || !action.status.is_terminal()));
@@ -228,47 +220,37 @@ fn said(meant: bool, change: impl FnOnce()) -> bool {
 
 fn take_id(agv: &mut Agv, message: &Value) {
     if let Some(id) = message.get("orderId").and_then(Value::as_str) {
-        id.clone_into(&mut agv.book.order_id);
+        id.clone_into(&mut agv.order.order_id);
     }
 }
 
 /// How long a wrong report stands.
 const CORRECTION: Duration = Duration::from_millis(800);
 
-/// One that reports a refusal wrongly at first.
-struct Corrected {
-    change: fn(&mut ActiveError),
-    /// When it is put right, what was said, and what is said then.
-    later: Option<(Moment, ActiveError, ActiveError)>,
-}
+/// When a wrong report is put right, what was said, and what is said then.
+type Later = Option<(Moment, ActiveError, ActiveError)>;
 
+/// Reports a refusal wrongly at first.
 fn corrected(change: fn(&mut ActiveError)) -> Box<dyn Deviation> {
-    Box::new(Corrected { change, later: None })
-}
-
-impl Deviation for Corrected {
-    fn raises(&mut self, agv: &mut Agv, cause: Cause<'_>, error: &mut ActiveError) -> bool {
-        if !matches!(cause, Cause::Failure(_)) {
-            let right = error.clone();
-            (self.change)(error);
-            error.life = Life::UntilNewOrder;
-            self.later = Some((agv.moment() + CORRECTION, error.clone(), right));
-        }
-        true
-    }
-
-    fn happens(&mut self, agv: &mut Agv, event: Event) {
-        let now = agv.moment();
-        if event == Event::Woken
-            && let Some((_, wrong, right)) = self.later.take_if(|(due, ..)| *due <= now)
-            && let Some(at) = agv.errors.active.iter().position(|error| *error == wrong)
-        {
-            agv.errors.active.remove(at);
-            agv.errors.raise(right);
-        }
-    }
-
-    fn due(&self) -> Option<Moment> {
-        self.later.as_ref().map(|(due, ..)| *due)
-    }
+    holding((change, Later::None))
+        .raises(|(change, later), agv, cause, error| {
+            if !matches!(cause, Cause::Failure(_)) {
+                let right = error.clone();
+                change(error);
+                error.life = Life::UntilNewOrder;
+                *later = Some((agv.moment() + CORRECTION, error.clone(), right));
+            }
+            true
+        })
+        .happens(|(_, later), agv, event| {
+            let now = agv.moment();
+            if event == Event::Woken
+                && let Some((_, wrong, right)) = later.take_if(|(due, ..)| *due <= now)
+                && let Some(at) = agv.errors.active.iter().position(|error| *error == wrong)
+            {
+                agv.errors.active.remove(at);
+                agv.errors.raise(right);
+            }
+        })
+        .due(|(_, later), _| later.as_ref().map(|(due, ..)| *due))
 }

@@ -1,36 +1,30 @@
 //! Deviations of the way ahead, as a state lists it: nodeStates and edgeStates (section 6.10).
 
-use super::hooks::{Hooks, Object, edge, holding, is_done, node, route, state};
-use crate::agv::Agv;
-use crate::agv::seam::{Deviation, Event, Part};
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::{Value, json};
-use std::collections::BTreeSet;
+use super::prelude::*;
 
 records! {
     fault "route-omitted-when-idle" ["STATE-13", "STATE-MSG-01"] "It leaves nodeStates and edgeStates out when nothing is to be traversed."
-        => state(|agv, m| if agv.book.nodes.is_empty() {
+        => state(|agv, m| if agv.order.nodes.is_empty() {
             m.unset("nodeStates");
             m.unset("edgeStates");
         });
     fault "cancel-hides-next-node" ["ORD-CANCEL-09"] "While it drives to the next node to end a cancelled order it lists no node at all."
-        => state(|agv, m| if agv.book.cancel.as_ref().is_some_and(|cancel| cancel.to_node) { m.set("nodeStates", json!([])) });
+        => state(|agv, m| if agv.order.cancel.as_ref().is_some_and(|cancel| cancel.to_node) { m.set("nodeStates", json!([])) });
     fault "traversed-nodes-listed" ["STATE-12", "NODE-03"] "Keeps listing the node it has reached last."
         => state(|agv, m| if !is_done(agv) { list_last_node(agv, m) });
     fault "finished-order-listed" ["STATE-13"] "Keeps the last node in its states when the order is complete."
-        => state(|agv, m| if is_done(agv) && agv.book.has_order() { list_last_node(agv, m) });
+        => state(|agv, m| if is_done(agv) && agv.order.has_order() { list_last_node(agv, m) });
     fault "last-route-listed" ["STATE-13", "NODE-03"] "Keeps the last node and the last edge in its states when the order is complete."
-        => state(|agv, m| if is_done(agv) && agv.book.has_order() {
+        => state(|agv, m| if is_done(agv) && agv.order.has_order() {
             list_last_node(agv, m);
             list_last_edge(agv, m);
         });
     fault "last-edge-listed" ["STATE-13"] "Keeps the last edge in its states when the order is complete."
-        => state(|agv, m| if is_done(agv) && agv.book.has_order() { list_last_edge(agv, m) });
+        => state(|agv, m| if is_done(agv) && agv.order.has_order() { list_last_edge(agv, m) });
     fault "edge-states-stay" ["NODE-05", "STATE-12"] "Keeps the edge it has left in its states."
         => state(|agv, m| if !is_done(agv) { list_last_edge(agv, m) });
     fault "route-repeated-on-request" ["STATE-13"] "Answers a stateRequest with the last node of an order that is done."
-        => state(|agv, m| if agv.report.answers_request() && agv.book.nodes.is_empty() { m.set("nodeStates", agv.last_node_state()) });
+        => state(|agv, m| if agv.report.answers_request() && agv.order.nodes.is_empty() { m.set("nodeStates", agv.last_node_state()) });
     fault "horizon-not-reported" ["ORD-FLOW-06", "STATE-12"] "Leaves the horizon out of its node and edge states."
         => route(|_, _, m| m.says("released", true));
     fault "horizon-cut-to-one" ["STATE-12", "ORD-FLOW-06"] "Of the horizon it lists only the first node in its node states."
@@ -59,7 +53,7 @@ records! {
         => state(|_, m| m.list("edgeStates").reverse());
     fault "entered-edge-unlisted" ["STATE-12", "NODE-05"] "It removes the state of an edge as soon as it enters that edge."
         => edge(|agv, edge, _| {
-            let ahead = agv.book.edge_ahead().filter(|_| agv.book.entered);
+            let ahead = agv.order.edge_ahead().filter(|_| agv.order.entered);
             ahead.is_none_or(|ahead| ahead.sequence_id != edge.sequence_id)
         });
 
@@ -108,7 +102,7 @@ records! {
         });
     fault "horizon-positions-copied" ["ORD-FLOW-06"] "Gives the nodes of the horizon in its states the place of the first node that is listed."
         => node(|agv, stop, m| {
-            if let Some(first) = agv.book.nodes.front().filter(|_| !stop.node.released) {
+            if let Some(first) = agv.order.nodes.front().filter(|_| !stop.node.released) {
                 match first.node.sent_position.clone().filter(|_| !agv.config.line_guided()) {
                     Some(position) => m.set("nodePosition", position),
                     None => m.unset("nodePosition"),
@@ -120,7 +114,7 @@ records! {
 
 /// Whether an edge is the next one.
 fn is_next(agv: &Agv, sequence_id: u32) -> bool {
-    agv.book
+    agv.order
         .edges
         .front()
         .is_some_and(|next| next.sequence_id == sequence_id)
@@ -161,9 +155,9 @@ fn once_planned(nodes_too: bool) -> Box<Hooks<(bool, BTreeSet<u32>)>> {
                 planned.clear();
             }
             if matches!(event, Event::Begun | Event::Updated) {
-                let nodes = agv.book.nodes.iter().filter(|stop| !stop.node.released);
+                let nodes = agv.order.nodes.iter().filter(|stop| !stop.node.released);
                 planned.extend(nodes.map(|stop| stop.node.sequence_id));
-                let edges = agv.book.edges.iter().filter(|edge| !edge.released);
+                let edges = agv.order.edges.iter().filter(|edge| !edge.released);
                 planned.extend(edges.map(|edge| edge.sequence_id));
             }
         })

@@ -1,37 +1,9 @@
 //! Deviations of when actions begin and end, what may run beside what, and what an action does (section 6.10.2 and 6.12).
 
-use super::hooks::Hooks;
-use super::hooks::MOMENT;
-use super::hooks::brief;
-use super::hooks::failure;
-use super::hooks::forbidding;
-use super::hooks::goes_on;
-use super::hooks::holding;
-use super::hooks::is;
-use super::hooks::keep;
-use super::hooks::letting;
-use super::hooks::linger;
-use super::hooks::plain;
-use super::hooks::state;
-use super::hooks::when;
-use crate::agv::Agv;
 use crate::agv::Mode;
-use crate::agv::action_kinds::Deed;
-use crate::agv::actions::Action;
-use crate::agv::actions::Origin;
-use crate::agv::actions::Status;
-use crate::agv::deeds::Outcome;
-use crate::agv::errors::Life;
 use crate::agv::order_message::Blocking;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Part;
-use crate::agv::seam::Permission;
-use crate::agv::seam::Span;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::json;
-use std::time::Duration;
+
+use super::prelude::*;
 
 records! {
     fault "actions-held-offline" ["MQTT-04"] "As long as the link is broken it drives on but begins no action of its order."
@@ -43,24 +15,24 @@ records! {
     fault "action-end-missed-offline" ["MQTT-04"] "Leaves an action RUNNING for ever that ends while the link is down."
         => forbidding(|agv, what| matches!(what, Permission::Proceed(action) if action.of_order() && !agv.connection.online));
     fault "stuck-after-blocking" ["BLOCK-07", "ORD-06", "NODE-07"] "Does not drive on after a blocking action."
-        => forbidding(|agv, what| matches!(what, Permission::Drive) && has_stopped_for(agv, Some(Origin::Node(agv.book.last_sequence))));
+        => forbidding(|agv, what| matches!(what, Permission::Drive) && has_stopped_for(agv, Some(Origin::Node(agv.order.last_sequence))));
     fault "stuck-after-edge-action" ["BLOCK-07", "ORD-06"] "Does not drive on after a blocking action of an edge."
         => forbidding(|agv, what| {
-            let here = agv.book.edge_ahead().map(|edge| Origin::Edge(edge.sequence_id));
+            let here = agv.order.edge_ahead().map(|edge| Origin::Edge(edge.sequence_id));
             matches!(what, Permission::Drive) && has_stopped_for(agv, here)
         });
     fault "node-actions-skipped-offline" ["MQTT-04", "NODE-04"] "It never triggers the actions of nodes that it traverses while the link to the broker is down; they stay WAITING."
         => forbidding(|agv, what| matches!(what, Permission::Trigger(Origin::Node(_))) && !agv.connection.online);
     fault "first-node-actions-skipped" ["NODE-04", "ACT-01"] "It never begins the actions of the first node of an order with several nodes, as it stands there already."
-        => forbidding(|agv, what| matches!(what, Permission::Trigger(Origin::Node(0))) && !agv.book.nodes.is_empty());
+        => forbidding(|agv, what| matches!(what, Permission::Trigger(Origin::Node(0))) && !agv.order.nodes.is_empty());
     fault "one-node-order-actions-not-started" ["ORD-13", "NODE-04"] "It never starts the actions of a one-node order, because nothing is traversed, and keeps them WAITING."
-        => forbidding(|agv, what| matches!(what, Permission::Trigger(Origin::Node(0))) && agv.book.nodes.is_empty());
+        => forbidding(|agv, what| matches!(what, Permission::Trigger(Origin::Node(0))) && agv.order.nodes.is_empty());
     fault "loop-second-visit-without-actions" ["ORD-UPD-13", "NODE-04"] "It triggers the actions of a node only at its first visit; those of a second visit in the same order stay WAITING."
         => keep::<(Vec<String>, bool)>()
             .happens(|(visited, again), agv, event| match event {
                 Event::Begun => visited.clear(),
                 Event::NodeNoted(_) => {
-                    let reached = agv.book.left.0.as_ref().map_or_else(String::new, |stop| stop.node.id.clone());
+                    let reached = agv.order.left.0.as_ref().map_or_else(String::new, |stop| stop.node.id.clone());
                     *again = visited.contains(&reached);
                     visited.push(reached);
                 }
@@ -68,7 +40,7 @@ records! {
             })
             .allows(|(_, again), _, what, usual| usual && !(*again && matches!(what, Permission::Trigger(Origin::Node(_)))));
     fault "single-node-actions-fail" ["ORD-13", "NODE-04"] "It reports the actions of an order with a single node FAILED without having tried them."
-        => reaching(|agv, sequence_id| if sequence_id == 0 && agv.book.nodes.is_empty() { fail_at(agv, sequence_id) });
+        => reaching(|agv, sequence_id| if sequence_id == 0 && agv.order.nodes.is_empty() { fail_at(agv, sequence_id) });
     fault "passing-actions-fail" ["NODE-04", "ACT-01"] "It reports actions with blockingType NONE FAILED, without having tried them, on nodes where nothing makes it stop."
         => reaching(|agv, sequence_id| {
             let here = Origin::Node(sequence_id);
@@ -80,25 +52,25 @@ records! {
         });
     fault "loop-actions-early" ["ASTATE-02", "NODE-04"] "Performs the actions of a second visit of a node on the first."
         => passing(|agv, _| {
-            let reached = agv.book.left.0.as_ref().map(|stop| stop.node.id.clone());
-            let again = agv.book.nodes.iter().filter(|ahead| Some(&ahead.node.id) == reached.as_ref());
+            let reached = agv.order.left.0.as_ref().map(|stop| stop.node.id.clone());
+            let again = agv.order.nodes.iter().filter(|ahead| Some(&ahead.node.id) == reached.as_ref());
             let again: Vec<u32> = again.map(|ahead| ahead.node.sequence_id).collect();
             for id in again {
                 agv.trigger_actions(Origin::Node(id));
             }
         });
     fault "horizon-actions-begun" ["ASTATE-02"] "Begins the actions of the horizon when it stops at the decision point."
-        => passing(|agv, _| if let Some(planned) = agv.book.nodes.front().filter(|stop| !stop.node.released) {
+        => passing(|agv, _| if let Some(planned) = agv.order.nodes.front().filter(|stop| !stop.node.released) {
             agv.trigger_actions(Origin::Node(planned.node.sequence_id));
         });
     fault "edge-actions-on-node" ["NODE-07"] "Begins the actions of an edge while it is held on the node before."
         => passing(|agv, _| trigger_next_edge(agv));
     fault "edge-action-starts-before-leaving" ["NODE-07"] "It starts the edge action on arrival at the start node although a HARD node action still holds it there."
         => passing(|agv, _| {
-            let here = Origin::Node(agv.book.last_sequence);
+            let here = Origin::Node(agv.order.last_sequence);
             let waits = |action: &Action| action.origin == here && action.status == Status::Waiting;
             let hard = agv.actions.iter().any(|action| waits(action) && action.request.blocking == Blocking::Hard);
-            if hard && agv.book.edge_ahead().is_some_and(|edge| edge.released) {
+            if hard && agv.order.edge_ahead().is_some_and(|edge| edge.released) {
                 trigger_next_edge(agv);
             }
         })
@@ -107,12 +79,12 @@ records! {
             usual && !matches!(what, Permission::Await(action, origin) if of_node(action.origin) != of_node(origin))
         });
     fault "node-actions-early" ["NODE-04", "ASTATE-02"] "Begins the actions of a node when it sets out for it."
-        => when(Event::OnEdge, |agv| if let Some(stop) = agv.book.nodes.front() {
+        => when(Event::OnEdge, |agv| if let Some(stop) = agv.order.nodes.front() {
             agv.trigger_actions(Origin::Node(stop.node.sequence_id));
         });
     fault "none-aborted" ["ACT-01", "BLOCK-02"] "Breaks off the actions of type NONE of a node when it drives on."
         => plain().happens(|(), agv, event| if matches!(event, Event::EdgeEntered(_)) {
-            let here = Origin::Node(agv.book.last_sequence);
+            let here = Origin::Node(agv.order.last_sequence);
             let free = |action: &&mut Action| action.origin == here && action.request.blocking == Blocking::None && action.status.is_active();
             agv.actions.iter_mut().filter(free).for_each(|action| action.end(Status::Failed));
         });
@@ -124,7 +96,7 @@ records! {
     fault "edge-actions-late" ["NODE-06", "ACT-02"] "Begins the actions of an edge at its end."
         => plain()
             .allows(|(), agv, what, usual| {
-                let is_ahead = |id: u32| agv.book.edge_ahead().is_some_and(|edge| edge.sequence_id == id);
+                let is_ahead = |id: u32| agv.order.edge_ahead().is_some_and(|edge| edge.sequence_id == id);
                 match what {
                     Permission::PassOver(_) => true,
                     Permission::LeaveEdge => false,
@@ -149,7 +121,7 @@ records! {
     fault "edge-action-ends-with-the-order-only" ["NODE-05", "ACT-02"] "It lets an edge action run on over the end node until the vehicle stops."
         => forbidding(|agv, what| matches!(what, Permission::LeaveEdge) && goes_on(agv)).happens(|_, agv, event| {
             if matches!(event, Event::NodeReached(_)) && !goes_on(agv) {
-                let ahead = agv.book.edge_ahead().map_or(u32::MAX, |edge| edge.sequence_id);
+                let ahead = agv.order.edge_ahead().map_or(u32::MAX, |edge| edge.sequence_id);
                 let left = |action: &&Action| matches!(action.origin, Origin::Edge(id) if id < ahead);
                 let left: Vec<Origin> = agv.actions.iter().filter(left).map(|action| action.origin).collect();
                 for origin in left {
@@ -170,7 +142,7 @@ records! {
         });
     fault "edge-condition-stays" ["ACT-03"] "Leaves its warning lights on behind the edge that asked for them."
         => state(|agv, m| {
-            let lit = |action: &Action| is(action, Deed::WarningLights) && (action.status.is_active() || action.status.is_terminal());
+            let lit = |action: &Action| is(action, Effect::WarningLights) && (action.status.is_active() || action.status.is_terminal());
             if agv.actions.iter().any(lit) {
                 m.set("information", json!([{ "infoType": "warningLights", "infoLevel": "INFO" }]));
             }
@@ -277,55 +249,55 @@ records! {
                 }
                 true
             });
-    liberty "actions-last" ["ACT-01"] "Takes a second for every action."
-        => plain().lasts(|_, what, usual| match what {
+    tolerance "actions-last" ["ACT-01"] "Takes a second for every action."
+        => plain().lasts(|_, _, what, usual| match what {
             Span::Action(action) if action.number("duration").is_none() => usual.max(Duration::from_secs(1)),
             _ => usual,
         });
-    liberty "prepares-everything" ["ASTATE-03"] "Prepares every action of an order, and reports it INITIALIZING."
+    tolerance "prepares-everything" ["ASTATE-03"] "Prepares every action of an order, and reports it INITIALIZING."
         => letting(|_, what| matches!(what, Permission::Prepare));
-    liberty "never-prepares" ["ASTATE-03", "ACT-41"] "It reports no action as INITIALIZING when it needs no preparation."
+    tolerance "never-prepares" ["ASTATE-03", "ACT-41"] "It reports no action as INITIALIZING when it needs no preparation."
         => forbidding(|_, what| matches!(what, Permission::Prepare));
-    liberty "drives-on-late" ["BLOCK-07"] "It stands for half a second after a blocking action has ended before it drives on."
+    tolerance "drives-on-late" ["BLOCK-07"] "It stands for half a second after a blocking action has ended before it drives on."
         => plain().ends(|(), agv, action, outcome| {
-            let stops = action.of_order() && action.request.blocking != Blocking::None && !agv.book.nodes.is_empty();
+            let stops = action.of_order() && action.request.blocking != Blocking::None && !agv.order.nodes.is_empty();
             if stops && matches!(outcome, Outcome::Done(_)) {
                 linger(agv, 500);
             }
             outcome
         });
-    liberty "node-actions-in-next-state" ["NODE-04"] "It reports the traversal of a node with actions while they are still WAITING, stands there for a moment, and begins them right after that state."
+    tolerance "node-actions-in-next-state" ["NODE-04"] "It reports the traversal of a node with actions while they are still WAITING, stands there for a moment, and begins them right after that state."
         => reaching(|agv, sequence_id| if agv.actions.waiting_at(Origin::Node(sequence_id)) {
             // It stands on the node, and says so.
             linger(agv, 100);
             agv.flush();
         });
-    liberty "cut-edge-actions-fail" ["NODE-05"] "It reports an edge action as FAILED that it ends because it leaves the edge."
+    tolerance "cut-edge-actions-fail" ["NODE-05"] "It reports an edge action as FAILED that it ends because it leaves the edge."
         => forbidding(|_, what| matches!(what, Permission::EndWithEdge(action) if action.status.is_active())).happens(|_, agv, event| if let Event::EdgeLeft(id) = event {
             let cut = agv.actions.iter_mut().filter(|action| action.origin == Origin::Edge(id) && action.status.is_active());
             cut.for_each(|action| action.end(Status::Failed));
         });
-    liberty "failures-described" ["STATE-MSG-12"] "Failed actions have a resultDescription that says why, beside the error."
+    tolerance "failures-described" ["STATE-MSG-12"] "Failed actions have a resultDescription that says why, beside the error."
         => failure(|agv, action, e| {
             if let Some(action) = agv.actions.get_mut(&action.request.id) {
                 action.result = Some(e.description.clone());
             }
             true
         });
-    liberty "action-errors-until-new-order" ["IACT-06", "ACT-30", "ERR-01"] "It shows the error about a failed action until a new order is accepted."
+    tolerance "action-errors-until-new-order" ["IACT-06", "ACT-30", "ERR-01"] "It shows the error about a failed action until a new order is accepted."
         => failure(|_, _, e| {
             e.life = Life::UntilNewOrder;
             true
         });
-    liberty "action-errors-brief" ["IACT-06", "ACT-30", "MAP-19"] "It shows the error about a failed action for one or two states only."
+    tolerance "action-errors-brief" ["IACT-06", "ACT-30", "MAP-19"] "It shows the error about a failed action for one or two states only."
         => failure(|agv, _, e| {
             e.life = Life::Until(agv.moment() + brief(agv));
             true
         });
-    liberty "log-name-in-information" ["ACT-27", "INFO-01"] "The name of the last log is in the information of the states instead of a resultDescription, which the factsheet does not announce either."
+    tolerance "log-name-in-information" ["ACT-27", "INFO-01"] "The name of the last log is in the information of the states instead of a resultDescription, which the factsheet does not announce either."
         => keep::<Option<(String, String)>>()
             .ends(|log, _, action, outcome| match outcome {
-                Outcome::Done(Some(name)) if is(action, Deed::LogReport) => {
+                Outcome::Done(Some(name)) if is(action, Effect::LogReport) => {
                     *log = Some((action.id(), name));
                     Outcome::Done(None)
                 }
@@ -367,7 +339,7 @@ fn has_stopped_for(agv: &Agv, here: Option<Origin>) -> bool {
 fn fail_at(agv: &mut Agv, sequence_id: u32) {
     let here = Origin::Node(sequence_id);
     let open = |action: &&mut Action| action.origin == here && !action.status.is_terminal();
-    if agv.book.cancel.is_none() {
+    if agv.order.cancel.is_none() {
         agv.actions
             .iter_mut()
             .filter(open)
@@ -390,7 +362,7 @@ fn reaching(then: Passing) -> Box<Hooks<Passing>> {
 fn passing(then: Passing) -> Box<Hooks<Passing>> {
     holding(then).happens(|then, agv, event| {
         if let Event::NodePassed(id) = event
-            && agv.book.cancel.is_none()
+            && agv.order.cancel.is_none()
         {
             then(agv, id);
         }
@@ -398,13 +370,13 @@ fn passing(then: Passing) -> Box<Hooks<Passing>> {
 }
 
 fn trigger_next_edge(agv: &mut Agv) {
-    if let Some(id) = agv.book.edge_ahead().map(|edge| edge.sequence_id) {
+    if let Some(id) = agv.order.edge_ahead().map(|edge| edge.sequence_id) {
         agv.trigger_actions(Origin::Edge(id));
     }
 }
 
 /// Actions of edges last longer than any edge.
-fn on_edges_for_ever(_: &Agv, what: Span<'_>, usual: Duration) -> Duration {
+fn on_edges_for_ever<M>(_: &M, _: &Agv, what: Span<'_>, usual: Duration) -> Duration {
     match what {
         Span::Action(action) if matches!(action.origin, Origin::Edge(_)) => usual.max(Duration::from_secs(60)),
         _ => usual,
@@ -413,16 +385,10 @@ fn on_edges_for_ever(_: &Agv, what: Span<'_>, usual: Duration) -> Duration {
 
 /// Ends waitForTrigger by itself after a time.
 fn triggered(after: fn() -> Duration) -> Box<dyn Deviation> {
-    struct Triggered(fn() -> Duration);
-    impl Deviation for Triggered {
-        fn lasts(&self, _: &Agv, what: Span<'_>, usual: Duration) -> Duration {
-            match what {
-                Span::Action(action) if is(action, Deed::WaitForTrigger) => (self.0)(),
-                _ => usual,
-            }
-        }
-    }
-    Box::new(Triggered(after))
+    holding(after).lasts(|after, _, what, usual| match what {
+        Span::Action(action) if is(action, Effect::WaitForTrigger) => after(),
+        _ => usual,
+    })
 }
 
 type Queueing = fn(&Agv, &mut Vec<String>) -> Vec<Vec<String>>;

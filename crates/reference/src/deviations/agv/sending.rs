@@ -1,13 +1,9 @@
 //! Deviations of how messages are sent: topics, QoS and RETAIN, texts that are no JSON, and when states come
 //! (sections 6.2, 6.3 and 6.10).
 
-use super::hooks::{plain, replace, sending, silent, unsaid, when};
 use crate::agv::Mode;
-use crate::agv::seam::{Deviation, Event, Span};
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::json;
-use std::time::Duration;
+
+use super::prelude::*;
 
 records! {
     fault "other-major-version" ["TOPIC-03", "TOPIC-02"] "Publishes its visualization below another major version." because "It breaks a recommendation only."
@@ -41,23 +37,23 @@ records! {
         => unsaid(|agv, name, _| name == "visualization" && !agv.motion.is_moving());
 
     fault "nul-after-json" ["MQTT-02", "JSON-10", "STATE-02"] "Sends the terminating zero byte of its string with every periodic state."
-        => plain().writes(|_, out, text| if out.periodic { text.push(0) });
+        => plain().writes(|_, _, out, text| if out.periodic { text.push(0) });
     fault "latin-1-text" ["JSON-03", "STATE-02"] "Encodes the text of its periodic states in Latin-1."
         => sending(|_, out| if out.periodic {
             out.message.set("information", json!([{ "infoType": "place", "infoDescription": "Lagerpl@tz", "infoLevel": "INFO" }]));
-        }).writes(|_, out, text| if out.periodic { replace(text, b"Lagerpl@tz", b"Lagerpl\xe4tz") });
+        }).writes(|_, _, out, text| if out.periodic { replace(text, b"Lagerpl@tz", b"Lagerpl\xe4tz") });
     fault "nan-velocity" ["JSON-08", "MQTT-02", "STATE-02"] "Writes NaN as turning speed into its periodic states."
         => sending(|_, out| if out.periodic { out.message.set("velocity", json!({ "vx": 0.0, "vy": 0.0, "omega": "@" })) })
-            .writes(|_, out, text| if out.periodic { replace(text, b"\"@\"", b"NaN") });
+            .writes(|_, _, out, text| if out.periodic { replace(text, b"\"@\"", b"NaN") });
     fault "nan-as-text" ["JSON-08", "STATE-MSG-05"] "Writes the word NaN as turning speed into its periodic states."
         => sending(|_, out| if out.periodic { out.message.set("velocity", json!({ "vx": 0.0, "vy": 0.0, "omega": "NaN" })) });
     fault "duplicate-key" ["JSON-10"] "Repeats the key driving in its periodic states, with another value." because "JSON leaves open what a repeated key means; the check of JSON-10 remarks on it."
-        => plain().writes(|agv, out, text| if out.periodic {
+        => plain().writes(|_, agv, out, text| if out.periodic {
             let other: &[u8] = if agv.motion.is_moving() { b"{\"driving\":false," } else { b"{\"driving\":true," };
             replace(text, b"{", other);
         });
     fault "reach-unlimited" ["JSON-08", "MQTT-02", "STATE-MSG-15"] "While it charges it reports its reach as the overflowing number 1e999."
-        => plain().writes(|agv, _, text| if agv.charging { replace(text, b"\"reach\":8000", b"\"reach\":1e999") });
+        => plain().writes(|_, agv, _, text| if agv.charging { replace(text, b"\"reach\":8000", b"\"reach\":1e999") });
 
     fault "state-silence" ["STATE-02"] "Sends states only every 45 seconds when nothing happens."
         => silent(|_| true);
@@ -76,10 +72,10 @@ records! {
     fault "silent-after-reconnect" ["STATE-02"] "Sends no states for 35 seconds after it reconnected."
         => when(Event::Reporting, |agv| if agv.connection.sessions > 1 { agv.report.silent_until = Some(agv.moment() + Duration::from_secs(35)) });
     fault "state-interval-exceeded" ["STATE-02"] "Sends states less often than its factsheet says." because "The interval of the factsheet is no limit of the text; below 30 s a warning is all."
-        => plain().lasts(|_, what, usual| match what {
+        => plain().lasts(|_, _, what, usual| match what {
             Span::BetweenStates => usual * 2 + Duration::from_secs(2),
             _ => usual,
         });
     fault "visualization-slow" ["VIS-02"] "Publishes the visualization at a third of the stated rate." because "It breaks a recommendation only."
-        => plain().lasts(|_, what, usual| if matches!(what, Span::BetweenVisualizations) { usual * 3 } else { usual });
+        => plain().lasts(|_, _, what, usual| if matches!(what, Span::BetweenVisualizations) { usual * 3 } else { usual });
 }

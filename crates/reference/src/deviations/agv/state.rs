@@ -1,12 +1,8 @@
 //! Deviations of what a state says about the order, the vehicle and its load (section 6.10).
 
-use super::hooks::{is_done, keep, state, text};
 use crate::agv::Mode;
-use crate::agv::actions::Origin;
-use crate::agv::seam::{Deviation, Event, Part};
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::{Value, json};
+
+use super::prelude::*;
 
 records! {
     fault "field-misspelled" ["JSON-01", "STATE-MSG-01"] "Spells operatingMode with an underscore."
@@ -23,7 +19,7 @@ records! {
     fault "order-id-forgotten-on-request" ["STATE-MSG-02", "STATE-13"] "Answers a stateRequest without its orderId."
         => state(|agv, m| if agv.report.answers_request() { m.set("orderId", "") });
     fault "no-order-null" ["JSON-06", "STATE-MSG-02", "STATE-MSG-01"] "Before its first order it reports null as orderId."
-        => state(|agv, m| if !agv.book.has_order() { m.set("orderId", Value::Null) });
+        => state(|agv, m| if !agv.order.has_order() { m.set("orderId", Value::Null) });
     fault "order-id-prefixed" ["ORD-FLOW-06", "STATE-MSG-02"] "Shows orderIds with its own serial number in front."
         => state(|_, m| text(m, "orderId", |id| if id.is_empty() { String::new() } else { format!("7-{id}") }));
     fault "order-id-cut-at-32" ["ORD-FLOW-06", "STATE-MSG-02"] "It keeps an orderId in a buffer of 32 characters, so that a longer one (such as a UUID) is reported cut off."
@@ -31,9 +27,9 @@ records! {
     fault "update-id-reset-when-done" ["STATE-MSG-02"] "Sets the orderUpdateId back to 0 when the order is complete."
         => state(|agv, m| if is_done(agv) { m.set("orderUpdateId", 0) });
     fault "update-id-counted" ["ORD-FLOW-09", "STATE-MSG-02"] "Shows an orderUpdateId that is one too high once an update was taken over."
-        => state(|agv, m| if agv.book.update_id > 0 { m.set("orderUpdateId", agv.book.update_id + 1) });
+        => state(|agv, m| if agv.order.update_id > 0 { m.set("orderUpdateId", agv.order.update_id + 1) });
     fault "zone-set-invented" ["ORD-MSG-04", "STATE-MSG-03"] "Goes over to a zone set of its own when an order names one."
-        => state(|agv, m| if agv.book.zoned && agv.config.zone_set.is_some() { m.set("zoneSetId", "factory") });
+        => state(|agv, m| if agv.order.zoned && agv.config.zone_set.is_some() { m.set("zoneSetId", "factory") });
 
     fault "last-node-cleared-when-done" ["STATE-MSG-04"] "Empties the lastNodeId when the order is complete."
         => state(|agv, m| if is_done(agv) { m.set("lastNodeId", "") });
@@ -41,14 +37,14 @@ records! {
         => state(|agv, m| if agv.report.answers_request() { m.set("lastNodeId", "") });
     fault "last-node-is-next-node" ["STATE-MSG-04", "NODE-03"] "On an edge the vehicle reports the node it drives to as lastNodeId and lastNodeSequenceId."
         because "lastNodeId and what is left of the route contradict each other; which of them is wrong cannot be told, so that NODE-03 is warned of."
-        => state(|agv, m| if let Some(ahead) = agv.book.nodes.front().filter(|_| agv.book.entered) {
+        => state(|agv, m| if let Some(ahead) = agv.order.nodes.front().filter(|_| agv.order.entered) {
             m.set("lastNodeId", ahead.node.id.clone());
             m.set("lastNodeSequenceId", ahead.node.sequence_id);
         });
     fault "last-node-after-actions" ["NODE-03", "STATE-MSG-04"] "It removes the node state at a node with actions but sets lastNodeId and lastNodeSequenceId when the actions have ended."
         => state(|agv, m| {
-            let here = Origin::Node(agv.book.last_sequence);
-            let (node, sequence) = &agv.book.previous;
+            let here = Origin::Node(agv.order.last_sequence);
+            let (node, sequence) = &agv.order.previous;
             if !node.is_empty() && agv.actions.iter().any(|action| action.origin == here && !action.status.is_terminal()) {
                 m.set("lastNodeId", node.clone());
                 m.set("lastNodeSequenceId", *sequence);
@@ -57,9 +53,9 @@ records! {
     fault "last-sequence-reset-when-done" ["STATE-MSG-04"] "When its order is complete it reports lastNodeSequenceId 0."
         => state(|agv, m| if is_done(agv) { m.set("lastNodeSequenceId", 0) });
     fault "last-sequence-counts-nodes" ["STATE-MSG-04", "NODE-03"] "It counts only nodes in lastNodeSequenceId: 1 at the second node of an order instead of 2."
-        => state(|agv, m| m.set("lastNodeSequenceId", agv.book.last_sequence / 2));
+        => state(|agv, m| m.set("lastNodeSequenceId", agv.order.last_sequence / 2));
     fault "last-sequence-minus-one" ["JSON-09", "STATE-MSG-04"] "Before its first order the vehicle reports lastNodeSequenceId -1."
-        => state(|agv, m| if !agv.book.has_order() { m.set("lastNodeSequenceId", -1) });
+        => state(|agv, m| if !agv.order.has_order() { m.set("lastNodeSequenceId", -1) });
     fault "distance-not-reset" ["STATE-MSG-18"] "Counts the distance since its last node from the beginning of its order." because "It breaks a recommendation only."
         => keep::<Option<(f64, f64)>>()
             .happens(|begun, agv, event| if event == Event::Begun {
@@ -96,13 +92,13 @@ records! {
             }
         });
     fault "driving-while-waiting" ["STATE-MSG-08"] "Says that it drives when its order is done."
-        => state(|agv, m| if agv.book.nodes.is_empty() && agv.book.has_order() { m.set("driving", true) });
+        => state(|agv, m| if agv.order.nodes.is_empty() && agv.order.has_order() { m.set("driving", true) });
     fault "driving-at-decision-point" ["ORD-UPD-01", "STATE-MSG-08"] "Says that it drives while it waits at the decision point."
         => state(|agv, m| if agv.waits_at_decision_point() { m.set("driving", true) });
     fault "driving-kept" ["STATE-MSG-08", "STATE-08", "ORD-UPD-01"] "Says that it drives from its first order on, also when it stands."
-        => state(|agv, m| if agv.book.has_order() { m.set("driving", true) });
+        => state(|agv, m| if agv.order.has_order() { m.set("driving", true) });
     fault "driving-in-pause" ["ACT-12", "ACT-15", "STATE-MSG-08"] "Says that it drives as long as it is paused with an order."
-        => state(|agv, m| if agv.holds.pause && !agv.book.nodes.is_empty() { m.set("driving", true) });
+        => state(|agv, m| if agv.holds.pause && !agv.order.nodes.is_empty() { m.set("driving", true) });
     fault "driving-while-lifting" ["STATE-MSG-08", "BLOCK-03", "BLOCK-04"] "Says that it drives while it lifts."
         => state(|agv, m| if agv.is_lifting() { m.set("driving", true) });
     fault "pause-flag-missing" ["ACT-13"] "Does not report that it is paused."
@@ -117,7 +113,7 @@ records! {
         => keep::<bool>()
             .happens(|asked, agv, event| match event {
                 Event::Begun | Event::PowerCycled => *asked = false,
-                Event::Settled => *asked |= agv.book.base_runs_low(),
+                Event::Settled => *asked |= agv.order.base_runs_low(),
                 _ => {}
             })
             .says(|asked, _, part, m| {

@@ -1,28 +1,8 @@
 //! Deviations of when a state is sent: events that are not told, states that come again (section 6.10, STATE-02 to STATE-11).
 
-use super::hooks::Hooks;
-use super::hooks::Object;
-use super::hooks::holding;
-use super::hooks::keep;
-use super::hooks::number;
-use super::hooks::plain;
-use super::hooks::state;
-use super::hooks::when;
-use crate::agv::Agv;
-use crate::agv::book::Stop;
-use crate::agv::report::Changes;
-use crate::agv::report::Telling;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Part;
-use crate::agv::seam::Permission;
-use crate::agv::seam::Span;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::Value;
-use std::collections::VecDeque;
-use std::time::Duration;
-use tck_base::clock::Moment;
+use crate::agv::report::{Changes, Telling};
+
+use super::prelude::*;
 
 records! {
     fault "states-by-clock" ["STATE-09", "STATE-03", "STATE-06", "STATE-08"] "Sends states by the clock only, whatever happens."
@@ -59,7 +39,7 @@ records! {
             });
     fault "no-state-on-plain-nodes" ["STATE-06", "STATE-09"] "It sends no state when it passes a node that has no actions."
         => plain().tells(|(), agv, changes, _| {
-            let plain = agv.book.left.0.as_ref().is_some_and(|stop| stop.node.actions.is_empty());
+            let plain = agv.order.left.0.as_ref().is_some_and(|stop| stop.node.actions.is_empty());
             match changes.node && plain && !changes.driving && !changes.actions && !changes.order {
                 true => Telling::Never,
                 false => Telling::Now,
@@ -86,9 +66,9 @@ records! {
     fault "reconnect-relists-traversed-nodes" ["MQTT-03", "STATE-12"] "It reloads the node states of the moment of the link loss, so that nodes traversed during the outage are listed again after the reconnect."
         => keep::<(VecDeque<Stop>, Vec<Stop>)>()
             .happens(|(before, again), agv, event| match event {
-                Event::ConnectionLost => before.clone_from(&agv.book.nodes),
+                Event::ConnectionLost => before.clone_from(&agv.order.nodes),
                 Event::Reporting if agv.connection.sessions > 1 => {
-                    let ahead = |stop: &&Stop| agv.book.nodes.iter().any(|other| other.node.sequence_id == stop.node.sequence_id);
+                    let ahead = |stop: &&Stop| agv.order.nodes.iter().any(|other| other.node.sequence_id == stop.node.sequence_id);
                     *again = before.iter().filter(|stop| !ahead(stop)).cloned().collect();
                 }
                 Event::Updated => again.clear(),
@@ -99,7 +79,7 @@ records! {
                 _ => {}
             })
             .says(|(_, again), agv, part, m| {
-                if matches!(part, Part::State) && !agv.book.cancelled {
+                if matches!(part, Part::State) && !agv.order.cancelled {
                     let listed: Vec<Value> = again.iter().filter_map(|stop| agv.node_state(stop)).collect();
                     m.change("nodeStates", |states| if let Value::Array(states) = states {
                         states.splice(0..0, listed);
@@ -116,18 +96,18 @@ records! {
                 Event::Woken if due.take_if(|due| *due <= agv.moment()).is_some() => agv.publish_connection("ONLINE"),
                 _ => {}
             })
-            .due(|due| *due);
-    liberty "every-state-twice" ["STATE-02"] "Sends every state a second time."
+            .due(|due, _| *due);
+    tolerance "every-state-twice" ["STATE-02"] "Sends every state a second time."
         => again(1);
-    liberty "online-again" ["CONN-05", "CONN-10"] "The vehicle publishes ONLINE again with every tenth state."
+    tolerance "online-again" ["CONN-05", "CONN-10"] "The vehicle publishes ONLINE again with every tenth state."
         => when(Event::StateSent, |agv| if agv.states_sent.is_multiple_of(10) { agv.publish_connection("ONLINE") });
-    liberty "factsheet-again" ["FACT-01"] "Publishes its factsheet with every tenth state."
+    tolerance "factsheet-again" ["FACT-01"] "Publishes its factsheet with every tenth state."
         => when(Event::StateSent, |agv| if agv.states_sent.is_multiple_of(10) { agv.publish_factsheet() });
-    liberty "first-state-late" ["CONN-05", "STATE-02"] "The first state of a connection comes more than a second after ONLINE."
+    tolerance "first-state-late" ["CONN-05", "STATE-02"] "The first state of a connection comes more than a second after ONLINE."
         => when(Event::Reporting, |agv| agv.report.silent_until = Some(agv.moment() + Duration::from_millis(1_200)));
-    liberty "lib-battery-good-or-bad" ["STATE-MSG-15", "STATE-MSG-16"] "It reports a batteryCharge of only 80 or 20."
+    tolerance "lib-battery-good-or-bad" ["STATE-MSG-15", "STATE-MSG-16"] "It reports a batteryCharge of only 80 or 20."
         => state(|_, m| m.part("batteryState", |battery| number(battery, "batteryCharge", |charge| if charge > 50.0 { 80.0 } else { 20.0 })));
-    liberty "battery-drains" ["STATE-MSG-15"] "Its battery charge falls a little with every state."
+    tolerance "battery-drains" ["STATE-MSG-15"] "Its battery charge falls a little with every state."
         => state(|agv, m| {
             let used = u32::try_from(agv.states_sent % 5_000).unwrap_or_default();
             m.part("batteryState", |battery| if battery.says("batteryCharge", 87.5) {
@@ -150,7 +130,7 @@ fn untold(which: Untold, telling: Telling) -> Box<Hooks<(Untold, Telling)>> {
 
 /// The longest interval the standard allows, with some room.
 fn seldom<M>(hooks: Box<Hooks<M>>) -> Box<Hooks<M>> {
-    hooks.lasts(|_, what, usual| match what {
+    hooks.lasts(|_, _, what, usual| match what {
         Span::StatedBetweenStates => Duration::from_secs(28),
         _ => usual,
     })

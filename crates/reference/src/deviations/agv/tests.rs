@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{FAULTS, TOLERANCES, UnknownTolerance, built, lapse};
 use crate::Device;
 use crate::agv::AgvConfig;
-use crate::agv::seam::Outgoing;
+use crate::agv::hooks::Outgoing;
 use serde_json::{Value, json};
 use tck_base::clock::{Moment, Stamp};
 
@@ -20,12 +20,14 @@ fn config() -> AgvConfig {
 #[test]
 fn every_name_is_kebab_case_and_unique_among_all() {
     let faults = FAULTS.iter().map(|fault| fault.name);
-    let all: Vec<&str> = faults.chain(TOLERANCES.iter().map(|liberty| liberty.name)).collect();
+    let all: Vec<&str> = faults
+        .chain(TOLERANCES.iter().map(|tolerance| tolerance.name))
+        .collect();
     let letters = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
     assert!(all.iter().all(|name| name.chars().all(letters)));
     let unique: BTreeSet<&str> = all.iter().copied().collect();
     assert_eq!(unique.len(), all.len());
-    assert!(super::records().count() > 200 && all.len() > 700);
+    assert!(super::RECORDS.iter().count() > 200 && all.len() > 700);
 }
 
 #[test]
@@ -64,7 +66,7 @@ fn each_guesses_its_part_of_an_order() {
     let agv = built(config(), &[]).unwrap();
     let read = |name: &str, message: &Value| {
         let mut read = message.clone();
-        (super::find(name).unwrap().make)().reads(&agv, &mut read);
+        (super::RECORDS.find(name).unwrap().make)().reads(&agv, &mut read);
         read
     };
     let message = json!({ "orderUpdateId": "5", "nodes": [{ "sequenceId": -1, "actions": null }] });
@@ -79,7 +81,7 @@ fn each_guesses_its_part_of_an_order() {
     assert_eq!(read("missing-list-read-as-empty", &message)["edges"], json!([]));
 }
 
-/// A state as a vehicle with these liberties sends it.
+/// A state as a vehicle with these tolerances sends it.
 fn sent(names: &[&str]) -> Vec<u8> {
     let mut config = config();
     for name in names {
@@ -97,7 +99,7 @@ fn sent(names: &[&str]) -> Vec<u8> {
         retain: false,
         periodic: false,
     };
-    assert!(agv.publishes(&mut outgoing));
+    assert!(agv.sends(&mut outgoing));
     let mut text = Value::Object(outgoing.message.clone()).to_string().into_bytes();
     agv.writes(&outgoing, &mut text);
     text
@@ -129,7 +131,7 @@ fn numbers_and_texts_are_written_otherwise() {
 }
 
 #[test]
-fn a_slow_vehicle_is_slow_at_its_stations_whichever_liberty_came_first() {
+fn a_slow_vehicle_is_slow_at_its_stations_whichever_tolerance_came_first() {
     let taken = |names: [&str; 2]| {
         let mut config = AgvConfig::default();
         assert!(names.into_iter().all(|name| config.tolerate(name).is_ok()));
@@ -140,7 +142,7 @@ fn a_slow_vehicle_is_slow_at_its_stations_whichever_liberty_came_first() {
 }
 
 #[test]
-fn an_unknown_liberty_is_refused_by_name() {
+fn an_unknown_tolerance_is_refused_by_name() {
     let mut config = AgvConfig::default();
     let unknown = |name: &str| Err(UnknownTolerance(name.to_owned()));
     assert_eq!(config.tolerate("no-such"), unknown("no-such"));

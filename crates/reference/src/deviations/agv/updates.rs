@@ -1,36 +1,8 @@
 //! Deviations of order updates: which are refused, how they are joined, and what becomes of the horizon (section 6.6.2).
 
-use super::hooks::Hooks;
-use super::hooks::forbidding;
-use super::hooks::heedless;
-use super::hooks::is_acting;
-use super::hooks::keep;
-use super::hooks::letting;
-use super::hooks::overlooking;
-use super::hooks::parked;
-use super::hooks::plain;
-use super::hooks::since_update;
-use super::hooks::unbound;
-use super::hooks::updating;
-use super::hooks::when;
 use super::orders::has_failed;
-use crate::agv::Agv;
-use crate::agv::actions::Action;
-use crate::agv::actions::Origin;
-use crate::agv::actions::Status;
-use crate::agv::order_message::Edge;
-use crate::agv::order_message::Order;
-use crate::agv::rejection::Refusal;
-use crate::agv::rejection::Rule;
-use crate::agv::seam::Deviation;
-use crate::agv::seam::Event;
-use crate::agv::seam::Hindrance;
-use crate::agv::seam::Objection;
-use crate::agv::seam::Part;
-use crate::agv::seam::Permission;
-use crate::agv::seam::Relation;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
+
+use super::prelude::*;
 
 records! {
     fault "stitching-node-overwritten" ["ORD-UPD-07"] "Takes over the actions an update brings for the stitching node."
@@ -54,7 +26,7 @@ records! {
         => updating(|agv, order| {
             let joint = &order.nodes[0];
             let place = agv.place(joint);
-            for stop in agv.book.nodes.iter_mut().filter(|stop| stop.node.sequence_id == joint.sequence_id) {
+            for stop in agv.order.nodes.iter_mut().filter(|stop| stop.node.sequence_id == joint.sequence_id) {
                 stop.node.position.clone_from(&joint.position);
                 stop.node.sent_position.clone_from(&joint.sent_position);
                 stop.place = place.clone().unwrap_or_else(|| stop.place.clone());
@@ -63,23 +35,23 @@ records! {
     fault "joint-listed-twice" ["ORD-FLOW-09", "STATE-12"] "An update makes it list the stitching node twice in its node states as long as it is ahead."
         => updating(|agv, order| {
             let joint = order.nodes[0].sequence_id;
-            let again = agv.book.nodes.iter().find(|stop| stop.node.sequence_id == joint).cloned();
-            agv.book.nodes.extend(again);
+            let again = agv.order.nodes.iter().find(|stop| stop.node.sequence_id == joint).cloned();
+            agv.order.nodes.extend(again);
         });
     fault "running-update-gap-accepted" ["ORD-FLOW-08"] "Takes over an update that does not begin at the decision point."
         => overlooking(|agv, what| matches!(what, Objection::Joint(_)) && runs(agv));
     fault "completed-update-gap-accepted" ["ORD-FLOW-10"] "Continues a completed order from whatever node the update begins with."
         => overlooking(|agv, what| matches!(what, Objection::Joint(_)) && !runs(agv));
     fault "update-joined-by-number" ["ORD-FLOW-08"] "Joins an update by its sequenceId, whatever the node."
-        => overlooking(|agv, what| matches!(what, Objection::Joint(first) if runs(agv) && first.sequence_id == agv.book.base_end.1));
+        => overlooking(|agv, what| matches!(what, Objection::Joint(first) if runs(agv) && first.sequence_id == agv.order.base_end.1));
     fault "joint-sequence-unchecked" ["ORD-FLOW-08"] "It joins an update to its running order by the nodeId alone, whatever the sequenceId of the first node."
-        => overlooking(|agv, what| matches!(what, Objection::Joint(first) if runs(agv) && first.id == agv.book.base_end.0));
+        => overlooking(|agv, what| matches!(what, Objection::Joint(first) if runs(agv) && first.id == agv.order.base_end.0));
     fault "joint-node-unchecked" ["ORD-FLOW-10"] "It joins an update to its completed order by the sequenceId alone, whatever the nodeId of the first node."
-        => overlooking(|agv, what| matches!(what, Objection::Joint(first) if !runs(agv) && first.sequence_id == agv.book.last_sequence));
+        => overlooking(|agv, what| matches!(what, Objection::Joint(first) if !runs(agv) && first.sequence_id == agv.order.last_sequence));
     fault "cancelled-order-revived" ["ORD-FLOW-10", "ORD-CANCEL-02", "ORD-CANCEL-11"] "Goes on with a cancelled order when an update of it comes late."
         => updating(|agv, _| revive(agv)).allows(|_, _, what, usual| usual || matches!(what, Permission::Overlook(Objection::Cancelled)));
     fault "cancel-ended-by-update" ["ORD-CANCEL-11", "ORD-CANCEL-02", "ORD-CANCEL-06"] "Ends a cancellation that is under way when an update comes, and drives it."
-        => updating(|agv, _| revive(agv)).allows(|_, agv, what, usual| usual || matches!(what, Permission::Overlook(Objection::Cancelled)) && agv.book.cancel.is_some());
+        => updating(|agv, _| revive(agv)).allows(|_, agv, what, usual| usual || matches!(what, Permission::Overlook(Objection::Cancelled)) && agv.order.cancel.is_some());
     fault "only-first-update" ["ORD-FLOW-09", "ORD-06"] "Refuses every further update of an order that was updated before."
         => since_update().objects(|updated, _, _, relation| (*updated && relation == Relation::Update).then(|| broken("no update is taken now")));
     fault "update-refused-while-acting" ["ORD-FLOW-09"] "Refuses updates while an action of the order runs."
@@ -105,7 +77,7 @@ records! {
     fault "second-extension-refused" ["ORD-FLOW-09", "ORD-UPD-08"] "It rejects a second order update that arrives before it has reached the last base node of the first order message, because it compares with that old decision point."
         => keep::<(u32, bool)>()
             .happens(|(first_base, updated), agv, event| match event {
-                Event::Begun => (*first_base, *updated) = (agv.book.base_end.1, false),
+                Event::Begun => (*first_base, *updated) = (agv.order.base_end.1, false),
                 Event::Updated => *updated = true,
                 _ => {}
             })
@@ -127,17 +99,17 @@ records! {
     fault "horizon-edges-stay" ["ORD-UPD-08", "ORD-UPD-09", "STATE-12"] "When an update replaces the horizon, the edges of the old one stay in its edge states."
         => keep::<Vec<Edge>>()
             .adopts(|edges, agv, _| {
-                *edges = agv.book.edges.iter().filter(|edge| !edge.released).cloned().collect();
+                *edges = agv.order.edges.iter().filter(|edge| !edge.released).cloned().collect();
                 true
             })
             .happens(|edges, agv, event| if event == Event::HorizonDropped {
-                agv.book.edges.extend(edges.drain(..));
+                agv.order.edges.extend(edges.drain(..));
             });
     fault "horizon-change-ignored" ["ORD-UPD-08"] "An update that brings only another horizon is acknowledged with its orderUpdateId, but the old horizon stays."
         => plain().adopts(|(), agv, adoption| {
             let ignored = adoption.update && only_plans(adoption.order);
             if ignored {
-                agv.book.update_id = adoption.order.update_id;
+                agv.order.update_id = adoption.order.update_id;
             }
             !ignored
         });
@@ -154,26 +126,26 @@ records! {
             })
             .happens(|unbound, _, event| *unbound &= event != Event::Begun);
     fault "horizon-deletion-shortens-base" ["ORD-UPD-09", "ORD-06"] "It also deletes the base still to be driven when an update deletes the horizon."
-        => updating(|agv, order| if order.nodes.len() == 1 && agv.book.nodes.iter().any(|stop| !stop.node.released) { shorten_base(agv) });
+        => updating(|agv, order| if order.nodes.len() == 1 && agv.order.nodes.iter().any(|stop| !stop.node.released) { shorten_base(agv) });
     fault "update-replaces-base" ["ORD-FLOW-09"] "Forgets what was left of the base when an update arrives."
-        => when(Event::HorizonDropped, |agv| while agv.book.nodes.len() > 1 {
-            agv.book.nodes.pop_front();
-            agv.book.edges.pop_front();
+        => when(Event::HorizonDropped, |agv| while agv.order.nodes.len() > 1 {
+            agv.order.nodes.pop_front();
+            agv.order.edges.pop_front();
         });
     fault "update-id-kept" ["ORD-FLOW-09"] "Executes an update but keeps reporting the old orderUpdateId."
-        => updating(|agv, order| order.update_id = agv.book.update_id);
+        => updating(|agv, order| order.update_id = agv.order.update_id);
     fault "stitch-only-update-id-kept" ["ORD-UPD-09", "ORD-FLOW-09"] "It deletes its horizon by an update that consists of the stitching node only, but keeps the old orderUpdateId."
-        => updating(|agv, order| if order.nodes.len() == 1 { order.update_id = agv.book.update_id });
+        => updating(|agv, order| if order.nodes.len() == 1 { order.update_id = agv.order.update_id });
     fault "first-state-after-update-has-old-lists" ["STATE-MSG-13", "ORD-FLOW-09", "STATE-12"] "It publishes the new orderUpdateId at once with the old node and edge states and corrects them only in the next state."
         => updating(|agv, order| {
-            let update_id = std::mem::replace(&mut agv.book.update_id, order.update_id);
+            let update_id = std::mem::replace(&mut agv.order.update_id, order.update_id);
             agv.flush();
-            agv.book.update_id = update_id;
+            agv.order.update_id = update_id;
         });
     fault "update-puts-new-nodes-in-front" ["STATE-12", "ORD-FLOW-09"] "It puts the nodes of an update before those still to be driven in nodeStates."
         => keep::<Option<u32>>()
             .adopts(|joint, agv, adoption| {
-                *joint = adoption.update.then_some(agv.book.base_end.1);
+                *joint = adoption.update.then_some(agv.order.base_end.1);
                 true
             })
             .says(|joint, _, part, m| {
@@ -190,14 +162,14 @@ records! {
     fault "stops-at-stitch" ["ORD-06", "ORD-FLOW-09"] "An update that arrives while it drives is taken over, but it stands still for ever at the stitching node."
         => stuck().adopts(|at, agv, adoption| {
             if adoption.update && agv.is_busy() && agv.motion.is_moving() {
-                *at = Some(agv.book.base_end.1);
+                *at = Some(agv.order.base_end.1);
             }
             true
         });
     fault "update-in-pause-not-driven" ["ORD-06", "ACT-14"] "It takes over an update that comes while it is paused, but after stopPause it does not drive beyond the old decision point."
         => stuck().adopts(|at, agv, adoption| {
             if adoption.update {
-                *at = agv.holds.pause.then_some(agv.book.base_end.1);
+                *at = agv.holds.pause.then_some(agv.order.base_end.1);
             }
             true
         });
@@ -229,7 +201,7 @@ records! {
     fault "update-actions-not-performed" ["ACT-01", "NODE-04"] "Lists the actions of an update and never begins them."
         => keep::<Option<u32>>()
             .happens(|end, agv, event| if event == Event::Begun {
-                *end = agv.book.nodes.back().map(|stop| stop.node.sequence_id);
+                *end = agv.order.nodes.back().map(|stop| stop.node.sequence_id);
             })
             .allows(|end, _, what, usual| usual && !matches!((end, what), (Some(end), Permission::Trigger(Origin::Node(id))) if id > *end));
     fault "released-actions-lost" ["ASTATE-01"] "Forgets an action of its horizon when an update releases it."
@@ -258,7 +230,7 @@ records! {
         => updating(|agv, _| if !agv.is_busy() { agv.actions.retain(|action| !action.status.is_terminal()) });
     fault "update-repeats-actions" ["ASTATE-06"] "Performs the actions of its last node once more when an update comes."
         => updating(|agv, _| {
-            let here = Origin::Node(agv.book.last_sequence);
+            let here = Origin::Node(agv.order.last_sequence);
             let ended = agv.actions.iter_mut().filter(|action| action.origin == here && action.status.is_terminal());
             ended.for_each(|action| action.end(Status::Waiting));
             agv.trigger_actions(here);
@@ -275,9 +247,9 @@ records! {
     fault "trajectory-of-update-ignored" ["ORD-MSG-26", "OPT-01"] "It follows the trajectories of a new order but drives straight on the edges that came by an update."
         because "ORD-MSG-26, that a trajectory is followed, is a recommendation, also for one that came with an update."
         => updating(|_, order| order.edges.iter_mut().for_each(|edge| edge.trajectory = None));
-    liberty "horizon-actions-fail" ["ORD-UPD-10", "STATE-MSG-10"] "It keeps the actions of a horizon that was deleted in its action states, as FAILED."
+    tolerance "horizon-actions-fail" ["ORD-UPD-10", "STATE-MSG-10"] "It keeps the actions of a horizon that was deleted in its action states, as FAILED."
         => when(Event::HorizonDropped, |agv| {
-            let base_end = agv.book.base_end.1;
+            let base_end = agv.order.base_end.1;
             for action in agv.actions.iter_mut().filter(|action| is_behind(action, base_end)) {
                 if !action.status.is_terminal() {
                     action.end(Status::Failed);
@@ -288,12 +260,12 @@ records! {
 }
 
 fn is_ahead(agv: &Agv, sequence_id: u32) -> bool {
-    agv.book.nodes.iter().any(|stop| stop.node.sequence_id == sequence_id)
+    agv.order.nodes.iter().any(|stop| stop.node.sequence_id == sequence_id)
 }
 
 /// Whether an update has to begin at the decision point.
 fn runs(agv: &Agv) -> bool {
-    agv.is_busy() || agv.book.cancelled
+    agv.is_busy() || agv.order.cancelled
 }
 
 /// Whether everything behind the stitching node is horizon.
@@ -309,14 +281,10 @@ type Refused = fn(&Agv, &Order) -> bool;
 
 /// Refuses updates that should be taken over.
 fn refused(which: Refused) -> Box<dyn Deviation> {
-    struct Refusing(Refused);
-    impl Deviation for Refusing {
-        fn objects(&self, agv: &Agv, order: &Order, relation: Relation) -> Option<Refusal> {
-            let refused = relation == Relation::Update && (self.0)(agv, order);
-            refused.then(|| broken("no update is taken now"))
-        }
-    }
-    Box::new(Refusing(which))
+    holding(which).objects(|which, agv, order, relation| {
+        let refused = relation == Relation::Update && which(agv, order);
+        refused.then(|| broken("no update is taken now"))
+    })
 }
 
 /// Knows whether the order was complete before and is continued.
@@ -336,14 +304,14 @@ fn stuck() -> Box<Hooks<Option<u32>>> {
             }
         })
         .allows(|at, agv, what, usual| {
-            usual && !(matches!(what, Permission::SetOut(_)) && *at == Some(agv.book.last_sequence))
+            usual && !(matches!(what, Permission::SetOut(_)) && *at == Some(agv.order.last_sequence))
         })
 }
 
 /// Goes on with an order that was cancelled.
 fn revive(agv: &mut Agv) {
-    agv.book.cancelled = false;
-    if let Some(cancel) = agv.book.cancel.take()
+    agv.order.cancelled = false;
+    if let Some(cancel) = agv.order.cancel.take()
         && let Some(action) = agv.actions.get_mut(&cancel.action_id)
     {
         action.end(Status::Finished);
@@ -359,12 +327,12 @@ fn is_behind(action: &Action, sequence_id: u32) -> bool {
 }
 
 fn is_planned(agv: &Agv, action: &Action) -> bool {
-    is_behind(action, agv.book.base_end.1)
+    is_behind(action, agv.order.base_end.1)
 }
 
 /// Puts actions of the horizon where nothing ever triggers them.
 fn strand(agv: &mut Agv, which: fn(&Action) -> bool, place: Origin) {
-    let base_end = agv.book.base_end.1;
+    let base_end = agv.order.base_end.1;
     let planned = agv
         .actions
         .iter_mut()
@@ -374,16 +342,16 @@ fn strand(agv: &mut Agv, which: fn(&Action) -> bool, place: Origin) {
 
 /// Forgets the base behind the next node.
 fn shorten_base(agv: &mut Agv) {
-    let Some(next) = agv.book.nodes.front().filter(|stop| stop.node.released) else {
+    let Some(next) = agv.order.nodes.front().filter(|stop| stop.node.released) else {
         return;
     };
-    let (end, old) = ((next.node.id.clone(), next.node.sequence_id), agv.book.base_end.1);
+    let (end, old) = ((next.node.id.clone(), next.node.sequence_id), agv.order.base_end.1);
     let gone = |sequence_id: u32| sequence_id > end.1 && sequence_id <= old;
-    agv.book.nodes.retain(|stop| !gone(stop.node.sequence_id));
-    agv.book.edges.retain(|edge| !gone(edge.sequence_id));
+    agv.order.nodes.retain(|stop| !gone(stop.node.sequence_id));
+    agv.order.edges.retain(|edge| !gone(edge.sequence_id));
     agv.actions.retain(|action| match action.origin {
         Origin::Node(sequence_id) | Origin::Edge(sequence_id) => !gone(sequence_id),
         Origin::Instant => true,
     });
-    agv.book.base_end = end;
+    agv.order.base_end = end;
 }

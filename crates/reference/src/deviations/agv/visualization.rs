@@ -1,10 +1,6 @@
 //! Deviations of what a visualization says (section 6.13).
 
-use super::hooks::{Object, number, visualization};
-use crate::agv::seam::Deviation;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde_json::Value;
+use super::prelude::*;
 
 records! {
     fault "visualization-theta-in-degrees" ["VIS-01", "MAP-02"] "It gives theta in degrees in the visualization, although in radians in the state."

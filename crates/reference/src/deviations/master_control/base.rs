@@ -1,16 +1,6 @@
 //! Deviations of how the base of a running order is extended, and what updates hold (section 6.6.2).
 
-use super::hooks::{keep, mode, plain};
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use crate::master_control::Site;
-use crate::master_control::order::Window;
-use crate::master_control::seam::{Deviation, Event, Fate, Heard, Made, Measure, Occasion, Permission};
-use crate::master_control::seen::State;
-use crate::master_control::vehicle::{Running, Vehicle};
-use serde_json::{Value, json};
-use std::collections::{BTreeMap, BTreeSet};
-use std::time::Duration;
+use super::prelude::*;
 
 records! {
     fault "first-vehicle-extended-only" ["MQTT-11", "ORD-UPD-02"] "Extends the base of the first vehicle of the fleet only."
@@ -18,31 +8,29 @@ records! {
         => extends(|site, vehicle, _| site.config.vehicles.first() == Some(&vehicle.config));
     fault "base-extended-late" ["ORD-UPD-02"] "Extends the base when the vehicle has halted at its end."
         because "It breaks a recommendation only."
-        => plain().allows(|(), _, vehicle, what, usual| match what {
+        => allowing(|vehicle, what, usual| match what {
             Permission::Grow(_, ahead, _) => ahead == 0 && !drives(vehicle),
             _ => usual,
         });
     fault "new-base-request-ignored" ["STATE-17", "ORD-UPD-02"] "Does not look at newBaseRequest."
         because "It breaks a recommendation only."
-        => heeds(|_, _| false);
+        => heeds(|_| false);
     fault "new-base-only-at-rest" ["STATE-17"] "It ignores newBaseRequest while the vehicle is driving."
         because "STATE-17, an answer to newBaseRequest, is described and not demanded; the base comes when the vehicle stands."
-        => heeds(|vehicle, _| !drives(vehicle));
+        => heeds(|vehicle| !drives(vehicle));
     fault "new-base-ignored-in-semiautomatic" ["STATE-17"] "It ignores newBaseRequest of a vehicle in SEMIAUTOMATIC."
         because "STATE-17, an answer to newBaseRequest, is described and not demanded; how traffic stands in SEMIAUTOMATIC is not known."
-        => heeds(|vehicle, _| mode(vehicle) != "SEMIAUTOMATIC");
+        => heeds(|vehicle| mode(vehicle) != "SEMIAUTOMATIC");
     fault "new-base-answered-once" ["STATE-17"] "It answers the first newBaseRequest of a vehicle and ignores every later one."
         because "STATE-17, an answer to newBaseRequest, is described and not demanded; traffic may forbid the second one."
-        => keep::<bool>().happens(|answered, _, _, event| if let Event::Updated(_, asked) = event {
-            *answered |= *asked;
-        }).allows(|answered, _, _, what, usual| usual && !(*answered && matches!(what, Permission::Heed(_))));
+        => keep::<bool>().happens(|answered, _, _, event| if let Event::Updated(_, asked) = event { *answered |= *asked; }).allows(|answered, _, _, what, usual| usual && !(*answered && matches!(what, Permission::Heed)));
     fault "new-base-request-heard-once" ["STATE-17", "ORD-UPD-02"] "It answers only the first newBaseRequest of an order and waits for the decision point afterwards."
         => keep::<bool>().happens(|answered, _, _, event| match event {
             Event::Updated(_, asked) => *answered |= *asked,
             Event::Begun => *answered = false,
             _ => {}
         }).allows(|answered, _, vehicle, what, usual| match what {
-            Permission::Heed(_) => usual && !*answered,
+            Permission::Heed => usual && !*answered,
             Permission::Grow(_, ahead, _) if *answered => ahead == 0 && !drives(vehicle),
             _ => usual,
         });
@@ -60,18 +48,14 @@ records! {
             _ => usual,
         });
     fault "edge-ahead-released-when-asked" ["ORD-08"] "In an update that the vehicle asks for by newBaseRequest it also releases the first edge of the horizon."
-        => keep::<bool>().happens(|asked, _, vehicle, event| if let Event::Extending(_) = event {
-            *asked = asks(vehicle);
-        }).words(|asked, _, _, worded, m| worded.edges(m, |index, _, edge| if *asked && worded.is_update() && index + 1 == worded.window.released {
+        => keep::<bool>().happens(|asked, _, vehicle, event| if let Event::Extending(_) = event { *asked = asks(vehicle); }).words(|asked, _, _, worded, m| worded.edges(m, |index, _, edge| if *asked && worded.is_update() && index + 1 == worded.window.released {
             edge.set("released", true);
         }));
     fault "base-sent-again" ["ORD-UPD-03", "ORD-UPD-05"] "Sends the whole order with every update."
-        => plain().window(|(), _, _, _, window, _| window.first = 0);
+        => showing(|_, _, window, _| window.first = 0);
     fault "base-sent-again-after-pause" ["ORD-UPD-05", "ORD-UPD-03"]
         "After the vehicle was paused it begins the updates of the order with the first node of the order."
-        => keep::<bool>().happens(paused_with_it).window(|paused, _, _, _, window, _| if *paused {
-            window.first = 0;
-        });
+        => keep::<bool>().happens(paused_with_it).shows(|paused, _, _, _, window, _| if *paused { window.first = 0; });
     fault "no-base-after-pause" ["STATE-17", "ORD-UPD-02"] "It sends no further base for the order after the vehicle was paused and has been resumed."
         because "ORD-UPD-02 asks for a base early enough where traffic permits, and is a recommendation."
         => keep::<bool>().happens(paused_with_it).allows(|paused, _, _, what, usual| usual && !(*paused && matches!(what, Permission::Extend(_))));
@@ -85,19 +69,13 @@ records! {
             }
             Event::Begun | Event::Updated(..) => *resumed = false,
             _ => {}
-        }).window(|resumed, _, _, _, window, _| if *resumed {
-            window.first = 0;
-        });
+        }).shows(|resumed, _, _, _, window, _| if *resumed { window.first = 0; });
     fault "update-from-vehicle" ["ORD-UPD-05", "ORD-UPD-03"] "Order updates begin with the node the vehicle has reached last and repeat the base from there."
-        => plain().window(|(), _, vehicle, running, window, _| if running.released > 0 {
-            window.first = running.reached(vehicle.state.as_ref()).min(running.released - 1);
-        });
+        => showing(|vehicle, running, window, _| if running.released > 0 { window.first = running.reached(vehicle.state.as_ref()).min(running.released - 1); });
     fault "update-begins-one-node-early" ["ORD-UPD-05", "ORD-UPD-03"] "It begins an update with the last but one node of the base sent before."
-        => plain().window(|(), _, _, running, window, _| if running.released > 0 {
-            window.first = running.released.saturating_sub(2);
-        });
+        => showing(|_, running, window, _| if running.released > 0 { window.first = running.released.saturating_sub(2); });
     fault "loop-stitched-at-first-pass" ["ORD-UPD-05", "ORD-UPD-03"] "Looks the stitching node up by its nodeId, and begins where the way passed it first."
-        => plain().window(|(), _, _, running, window, _| {
+        => showing(|_, running, window, _| {
             let node = running.stops.get(window.first).map(|stop| &stop.id);
             let first = running.stops.iter().position(|stop| Some(&stop.id) == node);
             window.first = first.unwrap_or(window.first);
@@ -111,10 +89,8 @@ records! {
     fault "update-id-kept-after-resend" ["ORD-UPD-04"] "It does not raise the orderUpdateId of an update that follows a message which it had to send again."
         => update_id(|running| running.update_id - u32::from(running.resends > 0));
     fault "update-id-raised-only-with-base" ["ORD-UPD-04"] "It leaves the orderUpdateId as it is when only the horizon changes."
-        => keep::<bool>().window(|grows, _, _, running, window, _| *grows = window.released > running.released)
-            .happens(|grows, _, _, event| if let Event::Updating(running) = event && running.changed && !*grows {
-                running.update_id -= 1;
-            });
+        => keep::<bool>().shows(|grows, _, _, running, window, _| *grows = window.released > running.released)
+            .happens(|grows, _, _, event| if let Event::Updating(running) = event && running.changed && !*grows { running.update_id -= 1; });
     fault "counts-updates-from-the-reported-state" ["ORD-UPD-04"]
         "It takes as next orderUpdateId the reported one plus one, so that two updates in quick succession carry the same id with different content."
         => plain().happens(|(), _, vehicle, event| if let Event::Updating(running) = event {
@@ -127,12 +103,10 @@ records! {
         });
     fault "refused-update-extended" ["ORD-UPD-05"] "Goes on from the end of an update that was refused."
         because "No sentence forbids to extend an order behind a refused update."
-        => plain().judges(|(), _, _, running, _, fate| if fate == Fate::CalledOff && running.refused {
+        => judging(|_, running, _, fate| if fate == Fate::CalledOff && running.refused {
             (running.refused, running.confirmed) = (false, true);
             Fate::Runs
-        } else {
-            fate
-        });
+        } else { fate });
     fault "e-stop-withdraws-base" ["ORD-UPD-03", "ORD-UPD-05", "ORD-CANCEL-01"]
         "It takes the rest of the base back by an update that begins where the vehicle is when the vehicle reports an emergency stop during an order."
         => withdraws(|state| !matches!(state.safety_state.e_stop.as_str(), "NONE" | ""));
@@ -145,7 +119,7 @@ records! {
             let mut errors = vehicle.state.iter().flat_map(|state| &state.errors);
             !errors.any(|error| error.error_level == "WARNING")
         });
-    liberty "no-update-while-paused" ["STATE-17", "ORD-UPD-02"] "It sends no further base as long as the vehicle is paused."
+    tolerance "no-update-while-paused" ["STATE-17", "ORD-UPD-02"] "It sends no further base as long as the vehicle is paused."
         => extends(|_, vehicle, _| !vehicle.is_paused());
     fault "base-planned-every-half-minute" ["ORD-UPD-02", "STATE-17"] "It extends the base no sooner than half a minute after its last order message."
         because "ORD-UPD-02 recommends a base early enough; a planner that is slow makes the vehicle halt, and breaks nothing."
@@ -158,7 +132,7 @@ records! {
         });
     fault "goal-released-on-arrival" ["ORD-UPD-02"] "It releases the last node of a transport only when the vehicle has halted at the end of the base before it."
         because "ORD-UPD-02 recommends a base early enough; a goal that is guarded makes the vehicle halt, and breaks nothing."
-        => plain().measures(|(), _, vehicle, what, usual| match what {
+        => measuring(|vehicle, what, usual| match what {
             Measure::Base(running, _, asked) => {
                 let ahead = running.released.saturating_sub(running.reached(vehicle.state.as_ref()) + 1);
                 let halts = !drives(vehicle) && ahead == 0;
@@ -168,12 +142,12 @@ records! {
             _ => usual,
         });
     fault "sequence-continues-over-orders" ["ORD-UPD-11"] "A second order continues the sequenceIds of the order before instead of beginning at 0."
-        => Box::new(Renumbered::new(false, false));
+        => renumbered(false);
     fault "sequence-continues-after-cancel" ["ORD-UPD-11"] "It continues the sequenceIds of a cancelled order in the new order that follows it."
-        => Box::new(Renumbered::new(true, false));
+        => renumbered(true);
     fault "sequence-gap-after-reroute" ["ORD-UPD-11", "ORD-UPD-12"]
         "After a change of destination the sequenceIds of the horizon given up are skipped, so that there is a gap."
-        => Box::new(Renumbered::new(true, true));
+        => renumbered_with_gaps();
     fault "queued-update-after-cancel" ["ORD-CANCEL-01", "IACT-02"] "It sends an update that waited for minOrderInterval after the cancelOrder that came in between."
         => keep::<(Option<Value>, Option<Value>)>().happens(|(waiting, late), site, vehicle, event| match event {
             Event::Waits(running, target, free) => {
@@ -199,19 +173,14 @@ records! {
             }
             _ => {}
         });
-    liberty "base-grows-eagerly" ["ORD-UPD-02"] "It extends the base by a node as soon as the message before was accepted, long before the vehicle needs it."
-        => plain().allows(|(), _, _, what, usual| match what {
-            Permission::Grow(running, ..) => usual || !running.is_whole(),
-            _ => usual,
-        }).measures(|(), _, _, what, usual| match what {
+    tolerance "base-grows-eagerly" ["ORD-UPD-02"] "It extends the base by a node as soon as the message before was accepted, long before the vehicle needs it."
+        => letting(|_, _, what| matches!(what, Permission::Grow(running, ..) if !running.is_whole())).measures(|_, _, _, what, usual| match what {
             Measure::Base(running, free, _) => usual.max(running.released + 1).min(free),
             _ => usual,
         });
-    liberty "updates-without-horizon" ["ORD-UPD-03", "ORD-09"] "Order updates hold the new base only and delete the horizon."
-        => plain().window(|(), _, _, running, window, _| if running.released > 0 && window.released > running.released {
-            window.end = window.released;
-        });
-    liberty "horizon-sent-again" ["ORD-UPD-03", "ORD-UPD-05"] "Once in an order it sends an order update that extends nothing and gives the same horizon again."
+    tolerance "updates-without-horizon" ["ORD-UPD-03", "ORD-09"] "Order updates hold the new base only and delete the horizon."
+        => showing(|_, running, window, _| if running.released > 0 && window.released > running.released { window.end = window.released; });
+    tolerance "horizon-sent-again" ["ORD-UPD-03", "ORD-UPD-05"] "Once in an order it sends an order update that extends nothing and gives the same horizon again."
         => keep::<bool>().happens(|sent, _, _, event| match event {
             Event::Extending(running) if !*sent && !running.is_whole() => {
                 *sent = true;
@@ -220,15 +189,15 @@ records! {
             Event::Begun => *sent = false,
             _ => {}
         });
-    liberty "horizon-deleted-first" ["ORD-UPD-03", "ORD-UPD-04"]
+    tolerance "horizon-deleted-first" ["ORD-UPD-03", "ORD-UPD-04"]
         "It deletes the horizon by one update and sends the new one by a second, when the destination is changed."
         => keep::<bool>().happens(|due, _, _, event| match event {
             Event::Led(_) => *due = true,
             Event::Updated(running, _) => running.changed |= std::mem::take(due),
             Event::Begun => *due = false,
             _ => {}
-        }).allows(without_horizon).window(ends_with_base);
-    liberty "horizon-deleted-on-pause" ["ORD-UPD-03", "ORD-UPD-02"]
+        }).allows(without_horizon).shows(ends_with_base);
+    tolerance "horizon-deleted-on-pause" ["ORD-UPD-03", "ORD-UPD-02"]
         "It deletes the horizon by an update when the operator pauses a vehicle and sends it again after the resume."
         => keep::<bool>().happens(|short, _, vehicle, event| match event {
             Event::Extending(running) => {
@@ -237,8 +206,8 @@ records! {
             }
             Event::Begun => *short = false,
             _ => {}
-        }).allows(without_horizon).window(ends_with_base);
-    liberty "horizon-withdrawn-and-given-again" ["ORD-UPD-12", "ORD-UPD-03"]
+        }).allows(without_horizon).shows(ends_with_base);
+    tolerance "horizon-withdrawn-and-given-again" ["ORD-UPD-12", "ORD-UPD-03"]
         "It takes the horizon back by an update with the stitching node only and gives it again by the next update."
         => keep::<(bool, bool)>().happens(|(due, done), _, vehicle, event| match event {
             Event::Extending(running) => {
@@ -247,15 +216,13 @@ records! {
                 let quick = vehicle.factsheet.as_ref().is_none_or(|sheet| sheet.order_interval <= 1.0);
                 let mut nodes = running.message["nodes"].as_array().into_iter().flatten();
                 let shown = nodes.any(|node| node["released"] == false);
-                if quick && shown && !*done && !running.changed && ahead > 1 && !asks(vehicle) {
-                    (*due, *done, running.changed) = (true, true, true);
-                }
+                if quick && shown && !*done && !running.changed && ahead > 1 && !asks(vehicle) { (*due, *done, running.changed) = (true, true, true); }
             }
             Event::Updated(running, _) => running.changed |= std::mem::take(due),
             Event::Begun => (*due, *done) = (false, false),
             _ => {}
         }).allows(|(due, _), site, vehicle, what, usual| without_horizon(due, site, vehicle, what, usual))
-        .window(|(due, _), site, vehicle, running, window, free| ends_with_base(due, site, vehicle, running, window, free));
+        .shows(|(due, _), site, vehicle, running, window, free| ends_with_base(due, site, vehicle, running, window, free));
 }
 
 fn drives(vehicle: &Vehicle) -> bool {
@@ -272,72 +239,42 @@ fn asks(vehicle: &Vehicle) -> bool {
 
 /// Extends the base only then.
 fn extends(when: fn(&Site, &Vehicle, &Running) -> bool) -> Box<dyn Deviation> {
-    struct Extends(fn(&Site, &Vehicle, &Running) -> bool);
-    impl Deviation for Extends {
-        fn allows(&self, site: &Site, vehicle: &Vehicle, what: Permission<'_>, usual: bool) -> bool {
-            match what {
-                Permission::Extend(running) => usual && self.0(site, vehicle, running),
-                _ => usual,
-            }
-        }
-    }
-    Box::new(Extends(when))
+    holding(when).allows(|when, site, vehicle, what, usual| {
+        usual && !matches!(what, Permission::Extend(running) if !when(site, vehicle, running))
+    })
 }
 
 /// Heeds newBaseRequest only then.
-fn heeds(when: fn(&Vehicle, &Running) -> bool) -> Box<dyn Deviation> {
-    struct Heeds(fn(&Vehicle, &Running) -> bool);
-    impl Deviation for Heeds {
-        fn allows(&self, _: &Site, vehicle: &Vehicle, what: Permission<'_>, usual: bool) -> bool {
-            match what {
-                Permission::Heed(running) => usual && self.0(vehicle, running),
-                _ => usual,
-            }
-        }
-    }
-    Box::new(Heeds(when))
+fn heeds(when: fn(&Vehicle) -> bool) -> Box<dyn Deviation> {
+    holding(when).allows(|when, _, vehicle, what, usual| usual && (!matches!(what, Permission::Heed) || when(vehicle)))
 }
 
 /// Gives updates another number.
 fn update_id(number: fn(&Running) -> u32) -> Box<dyn Deviation> {
-    struct UpdateId(fn(&Running) -> u32);
-    impl Deviation for UpdateId {
-        fn happens(&mut self, _: &mut Site, _: &mut Vehicle, event: &mut Event<'_>) {
-            if let Event::Updating(running) = event {
-                running.update_id = self.0(running);
-            }
+    holding(number).happens(|number, _, _, event| {
+        if let Event::Updating(running) = event {
+            running.update_id = number(running);
         }
-    }
-    Box::new(UpdateId(number))
+    })
 }
 
 /// Takes the base back once in an order, while the state shows something.
 fn withdraws(when: fn(&State) -> bool) -> Box<dyn Deviation> {
-    struct Withdraws(fn(&State) -> bool, BTreeSet<String>);
-    impl Deviation for Withdraws {
-        fn happens(&mut self, _: &mut Site, vehicle: &mut Vehicle, event: &mut Event<'_>) {
-            let serial = &vehicle.config.serial_number;
-            match event {
-                Event::Extending(running) if vehicle.state.as_ref().is_some_and(self.0) => {
-                    let reached = running.reached(vehicle.state.as_ref());
-                    if running.released > reached + 1 && self.1.insert(serial.clone()) {
-                        running.released = reached + 1;
-                        running.changed = true;
-                    }
+    each((when, false))
+        .happens(|(when, withdrawn), _, vehicle, event| match event {
+            Event::Extending(running) if vehicle.state.as_ref().is_some_and(&*when) => {
+                let reached = running.reached(vehicle.state.as_ref());
+                if running.released > reached + 1 && !std::mem::replace(withdrawn, true) {
+                    running.released = reached + 1;
+                    running.changed = true;
                 }
-                Event::Begun => {
-                    self.1.remove(serial);
-                }
-                _ => {}
             }
-        }
-
-        fn allows(&self, _: &Site, vehicle: &Vehicle, what: Permission<'_>, usual: bool) -> bool {
-            let grows = matches!(what, Permission::Grow(..));
-            usual && !(grows && vehicle.state.as_ref().is_some_and(self.0))
-        }
-    }
-    Box::new(Withdraws(when, BTreeSet::new()))
+            Event::Begun => *withdrawn = false,
+            _ => {}
+        })
+        .allows(|(when, _), _, vehicle, what, usual| {
+            usual && !(matches!(what, Permission::Grow(..)) && vehicle.state.as_ref().is_some_and(when))
+        })
 }
 
 /// Remembers that the vehicle was paused with its order.
@@ -355,20 +292,14 @@ fn without_horizon(due: &bool, _: &Site, _: &Vehicle, what: Permission<'_>, usua
     usual && !(*due && matches!(what, Permission::Grow(..)))
 }
 
-fn ends_with_base(due: &mut bool, _: &Site, _: &Vehicle, running: &Running, window: &mut Window, _: usize) {
+fn ends_with_base(due: &mut bool, _: &mut Site, _: &mut Vehicle, running: &Running, window: &mut Window, _: usize) {
     if *due && running.released > 0 {
         window.end = window.released;
     }
 }
 
-/// Numbers nodes and edges on over orders (all of them, or those called off), or with a gap behind a base that was led on.
-struct Renumbered {
-    called_off_only: bool,
-    gaps: bool,
-    by: BTreeMap<String, Numbers>,
-}
-
-#[derive(Default)]
+/// What is remembered of the numbers of nodes and edges.
+#[derive(Clone, Default)]
 struct Numbers {
     /// Of the first node of the running order.
     offset: usize,
@@ -380,89 +311,66 @@ struct Numbers {
     shown: usize,
 }
 
-impl Renumbered {
-    fn new(called_off_only: bool, gaps: bool) -> Self {
-        let by = BTreeMap::new();
-        Self {
-            called_off_only,
-            gaps,
-            by,
-        }
-    }
+/// Numbers nodes and edges on over orders (all of them, or those called off).
+fn renumbered(called_off_only: bool) -> Box<dyn Deviation> {
+    numbering(called_off_only, false)
 }
 
-impl Deviation for Renumbered {
-    fn happens(&mut self, _: &mut Site, vehicle: &mut Vehicle, event: &mut Event<'_>) {
-        let numbers = self.by.entry(vehicle.config.serial_number.clone()).or_default();
-        match event {
+/// Leaves a gap in the numbers behind a base that was led on.
+fn renumbered_with_gaps() -> Box<dyn Deviation> {
+    numbering(true, true)
+}
+
+fn numbering(called_off_only: bool, gaps: bool) -> Box<dyn Deviation> {
+    each((called_off_only, gaps, Numbers::default()))
+        .happens(|(called_off_only, gaps, numbers), _, vehicle, event| match event {
             Event::Planned(running) => {
-                numbers.offset = if self.gaps { 0 } else { numbers.next };
+                numbers.offset = if *gaps { 0 } else { numbers.next };
                 numbers.gap = None;
                 numbers.shown = running.stops.len();
             }
-            Event::Begun if !self.called_off_only => {
+            Event::Begun if !*called_off_only => {
                 numbers.next += 2 * vehicle.running.as_ref().map_or(0, |running| running.stops.len());
             }
             Event::Begun => numbers.next = 0,
-            Event::Ended(order, true) if self.called_off_only => numbers.next = numbers.offset + 2 * order.stops.len(),
+            Event::Ended(order, true) if *called_off_only => numbers.next = numbers.offset + 2 * order.stops.len(),
             Event::Led(running) => {
                 let skipped = 2 * numbers.shown.saturating_sub(running.released);
-                if self.gaps && numbers.gap.is_none() {
+                if *gaps && numbers.gap.is_none() {
                     numbers.gap = Some((2 * running.released, skipped));
                 }
                 numbers.shown = running.stops.len();
             }
             _ => {}
-        }
-    }
-
-    fn makes(&mut self, _: &Site, vehicle: &Vehicle, made: &mut Made<'_>) {
-        let Some(numbers) = self.by.get(&vehicle.config.serial_number) else {
-            return;
-        };
-        if let Made::Order(_, _, _, Value::Object(message)) = made {
-            for list in ["nodes", "edges"] {
-                message.each(list, |element| {
-                    element.change("sequenceId", |id| {
-                        let place = id.as_u64().and_then(|id| usize::try_from(id).ok()).unwrap_or_default();
-                        let skipped = numbers
-                            .gap
-                            .filter(|(from, _)| place + 1 >= *from)
-                            .map_or(0, |(_, skipped)| skipped);
-                        *id = json!(numbers.offset + place + skipped);
-                    })
+        })
+        .words(|(.., numbers), _, _, _, message| {
+            each_element(message, |element| {
+                element.change("sequenceId", |id| {
+                    let place = id.as_u64().and_then(|id| usize::try_from(id).ok()).unwrap_or_default();
+                    let gap = numbers.gap.filter(|(from, _)| place + 1 >= *from);
+                    *id = json!(numbers.offset + place + gap.map_or(0, |(_, skipped)| skipped));
                 });
+            });
+        })
+        // It reads its own numbers back.
+        .hears(|(.., numbers), _, vehicle, heard| {
+            let running = vehicle.running.as_ref();
+            let own = running.is_some_and(|running| heard.message["orderId"] == running.id);
+            if own
+                && heard.name == "state"
+                && let Some(state) = heard.message.as_object_mut()
+            {
+                let back = |id: &mut Value| {
+                    let place = id.as_u64().and_then(|id| usize::try_from(id).ok()).unwrap_or_default();
+                    let place = place.saturating_sub(numbers.offset);
+                    let gap = numbers.gap.filter(|(from, skipped)| place >= from + skipped);
+                    *id = json!(place - gap.map_or(0, |(_, skipped)| skipped));
+                };
+                state.change("lastNodeSequenceId", back);
+                for list in ["nodeStates", "edgeStates"] {
+                    state.each(list, |element| element.change("sequenceId", back));
+                }
             }
-        }
-    }
-
-    /// Reads its own numbers back.
-    fn hears(&mut self, _: &mut Site, vehicle: &mut Vehicle, heard: &mut Heard<'_>) -> bool {
-        let own = vehicle
-            .running
-            .as_ref()
-            .is_some_and(|running| heard.message["orderId"] == running.id);
-        let numbers = self
-            .by
-            .get(&vehicle.config.serial_number)
-            .filter(|_| own && heard.name == "state");
-        if let Some(numbers) = numbers
-            && let Some(state) = heard.message.as_object_mut()
-        {
-            let back = |id: &mut Value| {
-                let place = id.as_u64().and_then(|id| usize::try_from(id).ok()).unwrap_or_default();
-                let place = place.saturating_sub(numbers.offset);
-                let skipped = numbers
-                    .gap
-                    .filter(|(from, skipped)| place >= from + skipped)
-                    .map_or(0, |(_, skipped)| skipped);
-                *id = json!(place - skipped);
-            };
-            state.change("lastNodeSequenceId", back);
-            for list in ["nodeStates", "edgeStates"] {
-                state.each(list, |element| element.change("sequenceId", back));
-            }
-        }
-        true
-    }
+            true
+        })
 }

@@ -1,17 +1,9 @@
 //! Deviations of how orders are called off, and what comes before the end of that (section 6.6.3).
 
-use super::hooks::{hasty, keep, plain};
-use crate::deviations::record::Record;
-use crate::master_control::Site;
 use crate::master_control::driving::has_failed;
 use crate::master_control::rerouting::Reroute;
-use crate::master_control::seam::{Deviation, Event, Fate, Permission};
-use crate::master_control::seen::State;
-use crate::master_control::vehicle::{Presence, Running, Transport, Vehicle};
-use serde_json::{Value, json};
-use std::collections::BTreeSet;
-use std::time::Duration;
-use tck_base::clock::Moment;
+
+use super::prelude::*;
 
 records! {
     fault "order-instead-of-cancel" ["ORD-CANCEL-01"] "Sends a new order without calling the old one off."
@@ -29,12 +21,10 @@ records! {
             usual || (matches!(what, Permission::Follow) && vehicle.cancel.is_some() && running.is_some())
         }).judges(|(), _, vehicle, _, _, fate| if vehicle.cancel.is_some() { Fate::Runs } else { fate });
     fault "cancel-ends-with-route" ["ORD-CANCEL-01"] "Takes empty nodeStates for the end of cancelOrder."
-        => plain().allows(|(), _, vehicle, what, usual| {
-            usual || (matches!(what, Permission::CancelEnded) && vehicle.state.as_ref().is_some_and(State::route_empty))
-        });
+        => letting(|_, vehicle, what| matches!(what, Permission::CancelEnded) && vehicle.state.as_ref().is_some_and(State::route_empty));
     fault "action-not-awaited" ["ORD-CANCEL-01"] "Sends the next order while an action of the last one still runs."
         because "That a new order waits for the end of the old actions is read out of the text."
-        => plain().judges(|(), _, _, running, state, fate| {
+        => judging(|_, running, state, fate| {
             let driven = state.route_empty() && running.is_whole() && running.confirmed && running.accepted;
             if fate == Fate::Runs && driven { Fate::Over } else { fate }
         });
@@ -59,21 +49,17 @@ records! {
         => replaced(|vehicle, _| vehicle.presence == Presence::Away);
     fault "cancel-forgotten-before-acceptance" ["ORD-CANCEL-01"]
         "It strikes an order without sending cancelOrder when it is called off after it was sent and before a state has shown it."
-        => plain().happens(|(), site, vehicle, event| if let Event::CallingOff(then, sends) = event {
+        => calling_off(|site, vehicle, then, sends| {
             if vehicle.running.as_ref().is_some_and(|running| !running.accepted) {
-                **sends = false;
+                *sends = false;
                 site.drop_order(vehicle, None);
                 vehicle.queue.extend(then.take());
             }
         });
     fault "cancel-lost-while-away" ["ORD-CANCEL-01", "TOPIC-13"] "A cancellation asked for while the vehicle is away is never sent, and the order goes on."
-        => plain().happens(|(), _, vehicle, event| if let Event::CallingOff(_, sends) = event {
-            **sends &= vehicle.presence != Presence::Away;
-        });
+        => calling_off(|_, vehicle, _, sends| *sends &= vehicle.presence != Presence::Away);
     fault "cancels-only-once" ["ORD-CANCEL-01"] "It sends cancelOrder to a vehicle only once: later requests to call an order off lead to nothing."
-        => keep::<bool>().happens(|done, _, _, event| if let Event::CallingOff(_, sends) = event {
-            **sends &= !std::mem::replace(done, true);
-        });
+        => keep::<bool>().happens(|done, _, _, event| if let Event::CallingOff(_, sends) = event { **sends &= !std::mem::replace(done, true); });
     fault "cancel-of-paused-vehicle-only-internal" ["ORD-CANCEL-01", "TOPIC-13"]
         "It deletes the transport of a paused vehicle in its own list without sending cancelOrder, and dispatches the next one after stopPause."
         because "No sentence obliges a master control to call off what it may also leave without a further base."
@@ -92,15 +78,13 @@ records! {
             _ => usual,
         });
     fault "pause-instead-of-cancel" ["ORD-CANCEL-01"] "To call an order off it sends startPause and never cancelOrder."
-        => plain().happens(|(), site, vehicle, event| if let Event::CallingOff(_, sends) = event {
-            **sends = false;
+        => calling_off(|site, vehicle, _, sends| {
+            *sends = false;
             let pausing = vehicle.instants.iter().any(|instant| instant.kind() == "startPause");
-            if !vehicle.is_paused() && !pausing {
-                site.instant(vehicle, "startPause", &Value::Null);
-            }
+            if !vehicle.is_paused() && !pausing { site.instant(vehicle, "startPause", &Value::Null); }
         });
     fault "no-nodes" ["ORD-02"] "Sends an order without nodes to call off an order that is not begun yet."
-        => plain().happens(|(), site, vehicle, event| if let Event::CallingOff(..) = event && let Some(running) = &vehicle.running {
+        => happening(|site, vehicle, event| if let Event::CallingOff(..) = event && let Some(running) = &vehicle.running {
             let body = json!({ "orderId": running.id, "orderUpdateId": running.update_id + 1, "nodes": [], "edges": [] });
             site.publish(vehicle, "order", &body);
         });
@@ -116,7 +100,7 @@ records! {
         });
     fault "cancel-held-while-paused" ["ORD-CANCEL-01"] "It holds cancelOrder back as long as the vehicle is paused."
         because "ORD-CANCEL-01 names no time by which cancelOrder has to follow the wish."
-        => plain().allows(|(), _, vehicle, what, usual| usual && !(matches!(what, Permission::Tell("cancelOrder")) && vehicle.is_paused()));
+        => forbidding(|_, vehicle, what| matches!(what, Permission::Tell("cancelOrder")) && vehicle.is_paused());
     fault "new-order-without-cancel-in-pause" ["ORD-CANCEL-01", "ORD-UPD-03"]
         "It sends a new order without cancelOrder when the destination is changed while the vehicle is paused in the middle of its order."
         => keep::<bool>().happens(|hasty, _, vehicle, event| match event {
@@ -135,13 +119,11 @@ records! {
                 return Fate::Over;
             }
             fate
-        }).happens(|hasty, _, _, event| if let Event::Begun = event {
-            *hasty = false;
-        }).allows(hasty);
+        }).happens(|hasty, _, _, event| if let Event::Begun = event { *hasty = false; }).allows(hasty);
     fault "trigger-unsupervised" ["ACT-39"] "Waits for a trigger without end."
-        => plain().allows(|(), _, _, what, usual| usual && !matches!(what, Permission::Supervise(_)));
+        => forbidding(|_, _, what| matches!(what, Permission::Supervise(_)));
     fault "trigger-unsupervised-after-update" ["ACT-39"] "It does not supervise the time-out of waitForTrigger in an order that has been updated."
-        => plain().allows(|(), _, _, what, usual| usual && !matches!(what, Permission::Supervise(running) if running.is_updated()));
+        => forbidding(|_, _, what| matches!(what, Permission::Supervise(running) if running.is_updated()));
     fault "trigger-forgotten-in-pause" ["ACT-39"] "Stops the time of waitForTrigger when the vehicle is paused, and never starts it again."
         => keep::<bool>().happens(|forgotten, _, vehicle, event| match event {
             Event::State(_) => {
@@ -157,15 +139,13 @@ records! {
         }).allows(|once, _, _, what, usual| usual && !(*once && matches!(what, Permission::Supervise(_))));
     fault "trigger-timer-restarts" ["ACT-39"]
         "The time-out of waitForTrigger begins again with every state, so that it never runs out at a vehicle that reports often."
-        => plain().happens(|(), site, vehicle, event| if let Event::State(_) = event {
+        => state_taken(|site, vehicle| {
             let waits = vehicle.running.as_mut().and_then(|running| running.waits.as_mut());
             waits.into_iter().for_each(|(_, since)| *since = site.now.moment);
         });
     fault "trigger-timeout-pauses" ["ACT-39"] "When waitForTrigger runs too long it sends startPause and does not call the order off."
         => plain().judges(|(), site, vehicle, running, _, fate| {
-            if fate != Fate::TooLate {
-                return fate;
-            }
+            if fate != Fate::TooLate { return fate; }
             running.waits.iter_mut().for_each(|(_, since)| *since = site.now.moment);
             vehicle.at(site.now.moment + site.config.trigger_timeout);
             site.instant(vehicle, "startPause", &Value::Null);
@@ -178,34 +158,26 @@ records! {
                 return Fate::Over;
             }
             fate
-        }).happens(|hasty, _, _, event| if let Event::Begun = event {
-            *hasty = false;
-        }).allows(hasty);
+        }).happens(|hasty, _, _, event| if let Event::Begun = event { *hasty = false; }).allows(hasty);
     fault "trigger-timeout-only-drops-transport" ["ACT-39", "ORD-CANCEL-01"]
         "It drops the transport in its own list when waitForTrigger takes too long, but does not cancel the order."
-        => plain().judges(|(), _, _, _, _, fate| if fate == Fate::TooLate { Fate::Over } else { fate });
-    liberty "resumes-before-cancel" ["ORD-CANCEL-01"] "It sends stopPause to a paused vehicle before it calls its order off."
-        => plain().happens(|(), site, vehicle, event| if let Event::CallingOff(..) = event && vehicle.is_paused() {
-            site.instant(vehicle, "stopPause", &Value::Null);
-        });
-    liberty "pauses-before-cancel" ["ORD-CANCEL-01", "IACT-02"] "It sends startPause before cancelOrder, and stopPause when the cancellation has ended."
+        => judging(|_, _, _, fate| if fate == Fate::TooLate { Fate::Over } else { fate });
+    tolerance "resumes-before-cancel" ["ORD-CANCEL-01"] "It sends stopPause to a paused vehicle before it calls its order off."
+        => happening(|site, vehicle, event| if let Event::CallingOff(..) = event && vehicle.is_paused() { site.instant(vehicle, "stopPause", &Value::Null); });
+    tolerance "pauses-before-cancel" ["ORD-CANCEL-01", "IACT-02"] "It sends startPause before cancelOrder, and stopPause when the cancellation has ended."
         => keep::<bool>().happens(|resumes, site, vehicle, event| match event {
             Event::CallingOff(..) if !vehicle.is_paused() => *resumes = site.instant(vehicle, "startPause", &Value::Null).is_some(),
-            Event::CancelOver if std::mem::take(resumes) => {
-                site.instant(vehicle, "stopPause", &Value::Null);
-            }
+            Event::CancelOver if std::mem::take(resumes) => { site.instant(vehicle, "stopPause", &Value::Null); }
             _ => {}
         });
-    liberty "cancel-sent-to-idle" ["ORD-CANCEL-01"] "It passes a requested cancelOrder on to a vehicle that has nothing to do."
+    tolerance "cancel-sent-to-idle" ["ORD-CANCEL-01"] "It passes a requested cancelOrder on to a vehicle that has nothing to do."
         => plain().asked(|(), site, vehicle, command, _| {
             let idle = vehicle.running.is_none() && vehicle.queue.is_empty() && vehicle.cancel.is_none();
             let idle = idle && vehicle.state.as_ref().is_some_and(State::route_empty);
-            if command == "cancel" && idle && site.connection.online && site.commandable(vehicle) {
-                site.instant(vehicle, "cancelOrder", &Value::Null);
-            }
+            if command == "cancel" && idle && site.connection.online && site.commandable(vehicle) { site.instant(vehicle, "cancelOrder", &Value::Null); }
             true
         });
-    liberty "cancels-after-two-seconds" ["ORD-CANCEL-01", "TOPIC-13"] "It sends cancelOrder two seconds after the operator asked for it."
+    tolerance "cancels-after-two-seconds" ["ORD-CANCEL-01", "TOPIC-13"] "It sends cancelOrder two seconds after the operator asked for it."
         => keep::<Option<(Moment, String)>>().asked(|due, site, vehicle, command, _| {
             let order = vehicle.running.as_ref().map(|running| running.id.clone());
             let Some(order) = order.filter(|_| command == "cancel") else { return true };
@@ -217,11 +189,9 @@ records! {
             if later > site.now.moment {
                 vehicle.at(later);
                 *due = Some((later, order));
-            } else if vehicle.running.as_ref().is_some_and(|running| running.id == order) {
-                site.call_off(vehicle);
-            }
+            } else if vehicle.running.as_ref().is_some_and(|running| running.id == order) { site.call_off(vehicle); }
         });
-    liberty "cancels-on-fatal" ["IACT-02", "CONN-14"] "It cancels the order of a vehicle that reports a FATAL error."
+    tolerance "cancels-on-fatal" ["IACT-02", "CONN-14"] "It cancels the order of a vehicle that reports a FATAL error."
         => keep::<bool>().happens(|done, site, vehicle, event| match event {
             Event::Looked => {
                 let mut errors = vehicle.state.iter().flat_map(|state| &state.errors);
@@ -235,41 +205,29 @@ records! {
             Event::Begun => *done = false,
             _ => {}
         });
-    liberty "log-asked-after-failure" ["ACT-08", "ACT-31"] "After an action of an order has failed it asks for a log if the vehicle offers that."
+    tolerance "log-asked-after-failure" ["ACT-08", "ACT-31"] "After an action of an order has failed it asks for a log if the vehicle offers that."
         => keep::<bool>().judges(|asked, site, vehicle, running, state, fate| {
             if has_failed(running, state) && !*asked && vehicle.offer("logReport").is_some() {
                 *asked = true;
                 site.instant(vehicle, "logReport", &json!({ "reason": "an action has failed" }));
             }
             fate
-        }).happens(|asked, _, _, event| if let Event::Begun = event {
-            *asked = false;
-        });
+        }).happens(|asked, _, _, event| if let Event::Begun = event { *asked = false; });
 }
 
 /// Forgets an order instead of calling it off, and does not wait for its end.
 fn replaced(when: fn(&Vehicle, Option<&Transport>) -> bool) -> Box<dyn Deviation> {
-    struct Replaced(fn(&Vehicle, Option<&Transport>) -> bool, BTreeSet<String>);
-    impl Deviation for Replaced {
-        fn happens(&mut self, site: &mut Site, vehicle: &mut Vehicle, event: &mut Event<'_>) {
-            match event {
-                Event::CallingOff(then, sends) if self.0(vehicle, then.as_ref()) => {
-                    **sends = false;
-                    self.1.insert(vehicle.config.serial_number.clone());
-                    site.drop_order(vehicle, then.take());
-                }
-                Event::Begun => {
-                    self.1.remove(&vehicle.config.serial_number);
-                }
-                _ => {}
+    each((when, false))
+        .happens(|(when, replaced), site, vehicle, event| match event {
+            Event::CallingOff(then, sends) if when(vehicle, then.as_ref()) => {
+                **sends = false;
+                *replaced = true;
+                site.drop_order(vehicle, then.take());
             }
-        }
-
-        fn allows(&self, _: &Site, vehicle: &Vehicle, what: Permission<'_>, usual: bool) -> bool {
-            usual || (matches!(what, Permission::Interrupt) && self.1.contains(&vehicle.config.serial_number))
-        }
-    }
-    Box::new(Replaced(when, BTreeSet::new()))
+            Event::Begun => *replaced = false,
+            _ => {}
+        })
+        .allows(|(_, replaced), _, _, what, usual| usual || (*replaced && matches!(what, Permission::Interrupt)))
 }
 
 /// Whether a waitForTrigger of an order runs or is paused.

@@ -1,12 +1,6 @@
 //! Deviations of trajectories and corridors (sections 6.6.1 and 7).
 
-use super::hooks::{Object, edge, is_loaded, number, plain, scale, shift, update};
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use crate::master_control::Site;
-use crate::master_control::seam::{Deviation, Made};
-use crate::master_control::vehicle::Vehicle;
-use serde_json::{Value, json};
+use super::prelude::*;
 
 records! {
     fault "knots-missing" ["ORD-MSG-28"] "Sends trajectories without knotVector."
@@ -22,26 +16,16 @@ records! {
         => curve(|c| c.set("degree", c["degree"].as_u64().unwrap_or_default() + 1));
     fault "control-points-as-pairs" ["ORD-MSG-28", "JSON-10"] "Control points of a trajectory are pairs of numbers instead of objects with x and y."
         => curve(|c| c.list("controlPoints").iter_mut().for_each(|point| *point = json!([point["x"], point["y"]])));
-    liberty "weights-left-out" ["ORD-MSG-28"] "Control points have no weight."
+    tolerance "weights-left-out" ["ORD-MSG-28"] "Control points have no weight."
         => curve(|c| c.each("controlPoints", |point| point.unset("weight")));
-    liberty "equal-weights-of-two" ["ORD-MSG-28"] "It gives all control points of a trajectory the weight 2."
+    tolerance "equal-weights-of-two" ["ORD-MSG-28"] "It gives all control points of a trajectory the weight 2."
         => curve(|c| c.each("controlPoints", |point| point.set("weight", 2.0)));
     fault "curve-beside-nodes" ["ORD-MSG-30"] "Sends trajectories that lie three metres beside their nodes."
-        => curve(|c| c.each("controlPoints", |point| {
-            shift(point, "x", 3.0);
-            shift(point, "y", 3.0);
-        }));
+        => curve(|c| c.each("controlPoints", |point| ["x", "y"].iter().for_each(|axis| shift(point, axis, 3.0))));
     fault "corridor-apart" ["CORR-04", "ORD-MSG-30"] "Lets every corridor begin beside the end of the one before."
-        => curve(|c| if let Some(Value::Object(point)) = c.list("controlPoints").first_mut() {
-            shift(point, "x", 2.0);
-            shift(point, "y", 2.0);
-        });
+        => curve(|c| if let Some(Value::Object(point)) = c.list("controlPoints").first_mut() { ["x", "y"].iter().for_each(|axis| shift(point, axis, 2.0)); });
     fault "curve-of-way-there" ["ORD-MSG-30"] "The trajectory of an edge that leads to a node with a lesser id runs from the end node to the start node."
-        => edge(|e| {
-            if e.text("startNodeId") > e.text("endNodeId") {
-                e.part("trajectory", |curve| curve.list("controlPoints").reverse());
-            }
-        });
+        => edge(|e| if e.text("startNodeId") > e.text("endNodeId") { e.part("trajectory", |curve| curve.list("controlPoints").reverse()); });
     fault "curve-from-start-node" ["ORD-MSG-30"] "It gives the control points of a trajectory relative to the start node of the edge."
         => curve(|c| {
             let start = c.list("controlPoints").first().cloned().unwrap_or_default();
@@ -50,51 +34,37 @@ records! {
                 shift(point, "y", -start["y"].as_f64().unwrap_or_default());
             });
         });
-    liberty "cubic-straights" ["ORD-MSG-28", "ORD-MSG-29", "ORD-MSG-30"] "Straight trajectories are given as cubic curves with four control points on the line."
+    tolerance "cubic-straights" ["ORD-MSG-28", "ORD-MSG-29", "ORD-MSG-30"] "Straight trajectories are given as cubic curves with four control points on the line."
         => roomy_curve(|c| {
             let (from, to) = (c["controlPoints"][0].clone(), c["controlPoints"][1].clone());
             c.set("degree", 3);
             c.set("knotVector", json!([0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]));
             c.set("controlPoints", json!([from, between(&from, &to, 0.3), between(&from, &to, 0.7), to]));
         });
-    liberty "polyline-straights" ["ORD-MSG-29", "ORD-MSG-28"] "It gives straight trajectories a third control point halfway, with degree 1."
+    tolerance "polyline-straights" ["ORD-MSG-29", "ORD-MSG-28"] "It gives straight trajectories a third control point halfway, with degree 1."
         => roomy_curve(|c| {
             let (from, to) = (c["controlPoints"][0].clone(), c["controlPoints"][1].clone());
             c.set("knotVector", json!([0.0, 0.0, 0.5, 1.0, 1.0]));
             c.set("controlPoints", json!([from, between(&from, &to, 0.5), to]));
         });
     fault "unsupported-trajectory" ["OPT-03"] "Sends a trajectory to every vehicle."
-        => plain().field(|(), _, field, value| {
-            if field.name == "order.edges.trajectory" {
-                value.get_or_insert(field.default.clone());
-            }
-        });
+        => filling(|_, field, value| if field.name == "order.edges.trajectory" { value.get_or_insert(field.default.clone()); });
     fault "corridor-without-trajectory" ["CORR-02"] "Sends a corridor to vehicles without a trajectory."
-        => plain().words(|(), _, _, worded, m| worded.edges(m, |_, leg, edge| {
+        => edges(|_, _, _, leg, edge| {
             let (left, right) = leg.corridor.unwrap_or((0.5, 0.5));
             edge.unset("trajectory");
             edge.set("corridor", json!({ "leftWidth": left, "rightWidth": right, "corridorRefPoint": "KINEMATICCENTER" }));
-        }));
+        });
     fault "corridor-where-no-trajectory" ["CORR-02"] "It leaves the trajectory out on edges with a corridor although the vehicle knows none of its own."
         => edge(curveless);
     fault "corridor-alone-in-updates" ["CORR-02"] "Edges with a corridor have no trajectory in order updates."
         => update(|m| m.each("edges", curveless));
     fault "corridor-zero" ["CORR-05"] "Sends a corridor of no width where none is wanted."
-        => edge(|e| {
-            e.entry("corridor").or_insert(json!({ "leftWidth": 0.0, "rightWidth": 0.0 }));
-        });
+        => edge(|e| e.supply("corridor", json!({ "leftWidth": 0.0, "rightWidth": 0.0 })));
     fault "corridor-zero-at-goal" ["CORR-05"] "The last edge before the goal has a corridor of zero width on both sides instead of none."
-        => plain().words(|(), _, _, worded, m| worded.edges(m, |index, _, edge| {
-            if index + 2 == worded.running.stops.len() {
-                edge.part("corridor", |corridor| widths(corridor, 0.0, 0.0));
-            }
-        }));
+        => edges(|_, worded, index, _, edge| if index + 2 == worded.running.stops.len() { edge.part("corridor", |corridor| widths(corridor, 0.0, 0.0)); });
     fault "corridor-closed-when-loaded" ["CORR-05"] "It sends corridors of zero width, instead of none, to a vehicle that carries a load."
-        => plain().words(|(), _, vehicle, _, m| m.each("edges", |edge| {
-            if is_loaded(vehicle) {
-                edge.part("corridor", |corridor| widths(corridor, 0.0, 0.0));
-            }
-        }));
+        => composing(|_, vehicle, _, m| m.each("edges", |edge| if is_loaded(vehicle) { edge.part("corridor", |corridor| widths(corridor, 0.0, 0.0)); }));
     fault "corridor-negative" ["CORR-09"] "Sends corridors with a negative width to the right."
         => corridor(|c| scale(c, "rightWidth", -1.0));
     fault "corridor-one-sided" ["CORR-09"] "Leaves the left width out of corridors."
@@ -102,11 +72,7 @@ records! {
     fault "corridor-point-unknown" ["CORR-09", "JSON-02"] "Names the reference point of corridors with an underscore."
         => corridor(|c| c.set("corridorRefPoint", "KINEMATIC_CENTER"));
     fault "corridor-widths-as-text" ["CORR-09", "JSON-06", "JSON-10"] "leftWidth and rightWidth of a corridor are strings."
-        => corridor(|c| {
-            for key in ["leftWidth", "rightWidth"] {
-                c.change(key, |width| *width = json!(width.as_f64().unwrap_or_default().to_string()));
-            }
-        });
+        => corridor(|c| for key in ["leftWidth", "rightWidth"] { c.change(key, |width| *width = json!(width.as_f64().unwrap_or_default().to_string())); });
     fault "corridor-as-one-width" ["CORR-09", "JSON-10"] "It gives a corridor one member width instead of leftWidth and rightWidth."
         => corridor(|c| {
             let width = number(c, "leftWidth").unwrap_or_default() + number(c, "rightWidth").unwrap_or_default();
@@ -116,13 +82,13 @@ records! {
     fault "corridor-shifts-at-the-node" ["CORR-04"]
         "It sends, for consecutive edges, a corridor to the left only and then one to the right only, so that the vehicle may be outside the new corridor when it passes the node."
         because "The ruling of CORR-04 has geometric plausibility judged only; the vehicle can pass from one side to the other on the node."
-        => plain().words(|(), _, _, worded, m| worded.edges(m, |index, _, edge| edge.part("corridor", |corridor| {
+        => edges(|_, _, index, _, edge| edge.part("corridor", |corridor| {
             let both = number(corridor, "leftWidth").unwrap_or_default() + number(corridor, "rightWidth").unwrap_or_default();
             // To the left of one edge, and to the right of the next.
             if index % 2 == 0 { widths(corridor, both, 0.0) } else { widths(corridor, 0.0, both) }
-        })));
+        }));
     fault "corridor-narrower-than-node" ["CORR-04"] "It sends a corridor that is narrower than the allowed deviation at the node where the edge begins."
-        => plain().words(|(), _, _, _, m| {
+        => composing(|_, _, _, m| {
             let allowed: Vec<_> = m.list("nodes").iter().map(|node| node.pointer("/nodePosition/allowedDeviationXY").and_then(Value::as_f64)).collect();
             let mut allowed = allowed.into_iter();
             m.each("edges", |edge| {
@@ -134,24 +100,22 @@ records! {
     fault "deviation-wider-than-corridor" ["CORR-04", "OPT-03"]
         "It allows a deviation at the node before a corridor that is larger than the whole width of the corridor."
         because "Where the vehicle really passes the node is its own affair, so that CORR-04 leaves a warning."
-        => plain().words(|(), _, _, _, m| {
+        => composing(|_, _, _, m| {
             let width = |edge: &Value| edge["corridor"]["leftWidth"].as_f64().zip(edge["corridor"]["rightWidth"].as_f64());
             let widths: Vec<_> = m.list("edges").iter().map(width).collect();
             let mut widths = widths.into_iter();
             m.each("nodes", |node| {
-                if let Some((left, right)) = widths.next().flatten() {
-                    node.part("nodePosition", |place| place.set("allowedDeviationXY", left + right + 0.5));
-                }
+                if let Some((left, right)) = widths.next().flatten() { node.part("nodePosition", |place| place.set("allowedDeviationXY", left + right + 0.5)); }
             });
         });
-    liberty "corridor-asymmetric" ["CORR-09", "CORR-04"] "Its corridors are wider on the left than on the right."
+    tolerance "corridor-asymmetric" ["CORR-09", "CORR-04"] "Its corridors are wider on the left than on the right."
         => corridor(|c| shift(c, "leftWidth", 0.2));
-    liberty "corridor-by-contour" ["CORR-09"] "Corridors refer to the contour of the vehicle."
+    tolerance "corridor-by-contour" ["CORR-09"] "Corridors refer to the contour of the vehicle."
         => corridor(|c| c.set("corridorRefPoint", "CONTOUR"));
-    liberty "corridor-without-ref-point" ["CORR-09"] "Corridors have no corridorRefPoint."
+    tolerance "corridor-without-ref-point" ["CORR-09"] "Corridors have no corridorRefPoint."
         => corridor(|c| c.unset("corridorRefPoint"));
-    liberty "corridor-with-one-side-zero" ["CORR-05", "CORR-09"] "It sends a corridor with width only to the left where there is no room to the right."
-        => plain().words(|(), _, vehicle, worded, m| {
+    tolerance "corridor-with-one-side-zero" ["CORR-05", "CORR-09"] "It sends a corridor with width only to the left where there is no room to the right."
+        => composing(|_, vehicle, worded, m| {
             // No node of the way may allow a deviation, which might lie to the right of the next corridor (CORR-04).
             let sheet = vehicle.factsheet.as_ref();
             let demanded = sheet.and_then(|sheet| sheet.support("order.nodes.nodePosition.allowedDeviationXY"));
@@ -166,39 +130,34 @@ records! {
 
 /// Changes every trajectory.
 fn curve(change: fn(&mut Object)) -> Box<dyn Deviation> {
-    Box::new(Part("trajectory", change, false))
-}
-
-/// The same where the vehicle takes eight knots and four control points.
-fn roomy_curve(change: fn(&mut Object)) -> Box<dyn Deviation> {
-    Box::new(Part("trajectory", change, true))
+    part("trajectory", change)
 }
 
 /// Changes every corridor.
 fn corridor(change: fn(&mut Object)) -> Box<dyn Deviation> {
-    Box::new(Part("corridor", change, false))
+    part("corridor", change)
 }
 
-/// Changes a part of every edge that has it; only where there is room for a longer curve.
-struct Part(&'static str, fn(&mut Object), bool);
+/// Changes a part of every edge that has it.
+fn part(name: &'static str, change: fn(&mut Object)) -> Box<dyn Deviation> {
+    holding((name, change))
+        .words(|(name, change), _, _, _, message| message.each("edges", |edge| edge.part(name, *change)))
+}
 
-impl Deviation for Part {
-    fn makes(&mut self, _: &Site, vehicle: &Vehicle, made: &mut Made<'_>) {
+/// Changes every trajectory where the vehicle takes eight knots and four control points.
+fn roomy_curve(change: fn(&mut Object)) -> Box<dyn Deviation> {
+    holding(change).words(|change, _, vehicle, _, message| {
         let room = |name: &str, wanted: usize| {
             let sheet = vehicle.factsheet.as_ref();
-            let limit = sheet.map_or(usize::MAX, |sheet| sheet.limit(&[name, &format!("order.{name}")]));
-            !self.2 || limit >= wanted
+            sheet.map_or(usize::MAX, |sheet| sheet.limit(&[name, &format!("order.{name}")])) >= wanted
         };
-        let roomy = room("edges.trajectory.knotVector", 8)
-            && room("trajectory.knotVector", 8)
-            && room("edges.trajectory.controlPoints", 4)
-            && room("trajectory.controlPoints", 4);
-        if let Made::Order(_, _, _, Value::Object(message)) = made
-            && roomy
-        {
-            message.each("edges", |edge| edge.part(self.0, self.1));
+        let roomy = ["edges.trajectory", "trajectory"]
+            .iter()
+            .all(|curve| room(&format!("{curve}.knotVector"), 8) && room(&format!("{curve}.controlPoints"), 4));
+        if roomy {
+            message.each("edges", |edge| edge.part("trajectory", *change));
         }
-    }
+    })
 }
 
 fn between(from: &Value, to: &Value, share: f64) -> Value {

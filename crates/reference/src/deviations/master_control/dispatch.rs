@@ -1,34 +1,26 @@
 //! Deviations of when orders are begun, which id they get, over which nodes they lead and what is done there (sections
 //! 6.6.1 and 6.8).
 
-use super::hooks::{keep, plain};
-use crate::deviations::record::Record;
-use crate::master_control::Site;
 use crate::master_control::actions::is_predefined;
 use crate::master_control::commands::transport;
-use crate::master_control::dispatch::Way;
-use crate::master_control::seam::{Deviation, Event, Measure, Occasion, Permission, Span};
-use crate::master_control::vehicle::{Running, Stop, Transport, Vehicle};
-use serde_json::{Value, json};
-use std::collections::BTreeMap;
-use std::time::Duration;
-use tck_base::clock::Moment;
+
+use super::prelude::*;
 
 records! {
     fault "fleet-of-one" ["MQTT-11"] "Serves the first vehicle only."
         because "MQTT-11 is a recommendation."
         => plain().configures(|config| config.vehicles.truncate(1));
     fault "pause-for-all" ["TOPIC-13"] "Pauses every vehicle of the fleet, and lets all go on, when that is asked for one of them."
-        => Box::new(PauseForAll);
+        => pauses_all();
     fault "orders-not-sent" ["TOPIC-13"] "Plans its orders and never sends them."
         => plain().sends(|(), _, _, out| out.name != "order");
     fault "order-id-from-goal" ["ORD-MSG-02"] "It makes the orderId from the destination, so that a later transport to the same place has the same orderId."
-        => plain().happens(|(), _, _, event| if let Event::Planned(running) = event {
+        => planned(|_, _, running| {
             let transport = &running.transport;
             running.id = numbered(format!("to-{}", transport.to), transport.begun);
         });
     fault "order-id-from-route" ["ORD-MSG-02"] "It forms the orderId from start and destination, so that the same transport on another day has the same orderId."
-        => plain().happens(|(), _, _, event| if let Event::Planned(running) = event {
+        => planned(|_, _, running| {
             let transport = &running.transport;
             let start = running.stops.first().map(|stop| stop.id.as_str());
             let from = transport.from.as_deref().or(start).unwrap_or_default();
@@ -40,9 +32,7 @@ records! {
             Event::Planned(running) => running.id = kept.clone().unwrap_or(std::mem::take(&mut running.id)),
             Event::Begun => {
                 // The state from before the order names the order called off, under the same id.
-                if kept.take().is_some() && let Some(state) = &mut vehicle.state {
-                    state.order_id.clear();
-                }
+                if kept.take().is_some() && let Some(state) = &mut vehicle.state { state.order_id.clear(); }
             }
             _ => {}
         });
@@ -57,10 +47,8 @@ records! {
             Event::Begun => *kept = None,
             _ => {}
         });
-    liberty "update-id-from-seven" ["ORD-UPD-04"] "Begins orders with orderUpdateId 7."
-        => plain().happens(|(), _, _, event| if let Event::Planned(running) = event {
-            running.update_id = 7;
-        });
+    tolerance "update-id-from-seven" ["ORD-UPD-04"] "Begins orders with orderUpdateId 7."
+        => planned(|_, _, running| running.update_id = 7);
     fault "action-ids-kept-after-cancel" ["ORD-MSG-17"]
         "It gives the actions of the order after a cancelled one the actionIds of the actions of the same type in the cancelled one."
         => keep::<Option<Running>>().happens(|old, _, _, event| match event {
@@ -68,9 +56,7 @@ records! {
             Event::Planned(running) => {
                 let known: Vec<&Value> = old.iter().flat_map(|old| &old.stops).flat_map(|stop| &stop.actions).collect();
                 for action in running.stops.iter_mut().flat_map(|stop| &mut stop.actions) {
-                    if let Some(same) = known.iter().find(|known| known["actionType"] == action["actionType"]) {
-                        action["actionId"] = same["actionId"].clone();
-                    }
+                    if let Some(same) = known.iter().find(|known| known["actionType"] == action["actionType"]) { action["actionId"] = same["actionId"].clone(); }
                 }
             }
             Event::Begun => *old = None,
@@ -78,71 +64,59 @@ records! {
         });
     fault "action-ids-counted-per-message" ["ORD-MSG-17"]
         "It numbers the actions within each order message, so that the actions of an update get the ids of those of the first message."
-        => plain().happens(|(), _, vehicle, event| match event {
+        => happening(|_, vehicle, event| match event {
             Event::Begins(running) => number_actions(vehicle, running, 0),
             Event::Updating(running) => number_actions(vehicle, running, running.released),
             _ => {}
         });
-    liberty "horizon-actions-get-new-ids" ["ORD-MSG-17", "ORD-UPD-06"] "It gives the actions of the horizon new action ids when they are sent again in an update."
-        => plain().happens(|(), site, vehicle, event| if let Event::Updating(running) = event {
+    tolerance "horizon-actions-get-new-ids" ["ORD-MSG-17", "ORD-UPD-06"] "It gives the actions of the horizon new action ids when they are sent again in an update."
+        => updating(|site, vehicle, running| {
             let first = running.released;
-            for action in unreleased(running, first) {
-                action["actionId"] = json!(site.next_id(vehicle, "action"));
-            }
+            for action in unreleased(running, first) { action["actionId"] = json!(site.next_id(vehicle, "action")); }
         });
     fault "resume-on-first-node" ["ACT-08", "FACT-15"] "It puts a stopPause on the first node of an order for a vehicle that is paused."
-        => plain().happens(|(), site, vehicle, event| if let Event::Planned(running) = event && vehicle.is_paused() {
+        => planned(|site, vehicle, running| if vehicle.is_paused() {
             let action = site.action(vehicle, "stopPause", &Value::Null);
             running.stops[0].actions.push(action);
         });
     fault "state-request-at-goal" ["ACT-08", "FACT-15"] "It puts a stateRequest on the last node of each order."
-        => plain().way(|(), site, vehicle, way, _, _| at_goal(site, vehicle, way, "stateRequest"));
+        => planning(|site, vehicle, way| at_goal(site, vehicle, way, "stateRequest"));
     fault "pause-on-node" ["ACT-08", "FACT-15"] "Sends startPause as an action of a node."
-        => plain().way(|(), site, vehicle, way, _, _| at_goal(site, vehicle, way, "startPause"));
+        => planning(|site, vehicle, way| at_goal(site, vehicle, way, "startPause"));
     fault "pick-and-drop-share-id" ["ORD-MSG-17"] "The pick and the drop of one transport have the same actionId."
-        => plain().way(|(), _, _, way, _, _| {
+        => planning(|_, _, way| {
             let mut picked = None;
             for action in way.stops.iter_mut().flat_map(|stop| &mut stop.actions) {
                 if action["actionType"] == "pick" {
                     picked = Some(action["actionId"].clone());
-                } else if action["actionType"] == "drop" && let Some(id) = &picked {
-                    action["actionId"] = id.clone();
-                }
+                } else if action["actionType"] == "drop" && let Some(id) = &picked { action["actionId"] = id.clone(); }
             }
         });
     fault "action-id-of-station" ["ORD-MSG-17"]
         "It makes the actionId of a node action from its type and the node, so that the same action at the same node has it again in a later order."
-        => plain().way(|(), _, _, way, _, _| for stop in &mut way.stops {
-            for action in &mut stop.actions {
-                action["actionId"] = json!(format!("{}-{}", action["actionType"].as_str().unwrap_or_default(), stop.id));
-            }
+        => planning(|_, _, way| for stop in &mut way.stops {
+            for action in &mut stop.actions { action["actionId"] = json!(format!("{}-{}", action["actionType"].as_str().unwrap_or_default(), stop.id)); }
         });
     fault "hard-although-not-listed" ["FACT-15"] "It sends actions at stations with blocking type HARD, though the factsheet lists other blocking types only for them."
-        => plain().way(|(), _, _, way, _, _| for action in way_actions(way) {
-            action["blockingType"] = json!("HARD");
-        });
-    liberty "vendor-actions-block-nothing" ["ORD-MSG-16", "FACT-15"]
+        => planning(|_, _, way| for action in way_actions(way) { action["blockingType"] = json!("HARD"); });
+    tolerance "vendor-actions-block-nothing" ["ORD-MSG-16", "FACT-15"]
         "It sends actions of the manufacturer on nodes with blockingType NONE where the vehicle allows it."
-        => plain().way(|(), _, vehicle, way, _, _| for action in way.stops.iter_mut().flat_map(|stop| &mut stop.actions) {
+        => planning(|_, vehicle, way| for action in way.stops.iter_mut().flat_map(|stop| &mut stop.actions) {
             let kind = action["actionType"].as_str().unwrap_or_default();
             let listed = vehicle.offer(kind).and_then(|offer| offer.blocking_types.as_ref());
-            if !is_predefined(kind) && listed.is_none_or(|listed| listed.iter().any(|blocking| blocking == "NONE")) {
-                action["blockingType"] = json!("NONE");
-            }
+            if !is_predefined(kind) && listed.is_none_or(|listed| listed.iter().any(|blocking| blocking == "NONE")) { action["blockingType"] = json!("NONE"); }
         });
     fault "trigger-on-edge" ["ACT-08", "FACT-15"] "It puts waitForTrigger on the edge before the node."
-        => plain().way(|(), _, _, way, _, _| to_edges(way, |kind, _| kind == "waitForTrigger"));
-    liberty "actions-on-edges" ["ACT-08", "FACT-15"] "pick, drop and other actions are put on the last edge before the station where the vehicle offers that scope."
-        => plain().way(|(), site, vehicle, way, _, _| to_edges(way, |kind, taken| {
+        => planning(|_, _, way| to_edges(way, |kind, _| kind == "waitForTrigger"));
+    tolerance "actions-on-edges" ["ACT-08", "FACT-15"] "pick, drop and other actions are put on the last edge before the station where the vehicle offers that scope."
+        => planning(|site, vehicle, way| to_edges(way, |kind, taken| {
             let limit = vehicle.factsheet.as_ref().map_or(usize::MAX, |sheet| sheet.limit(&["edge.actions"]));
             site.offers(vehicle, kind, "EDGE") && taken < limit
         }));
     fault "edge-action-on-node" ["FACT-15"] "It puts an action on a node that the vehicle offers on edges only."
-        => plain().way(|(), _, _, way, _, _| for (leg, stop) in way.legs.iter_mut().zip(way.stops.iter_mut().skip(1)) {
-            stop.actions.append(&mut leg.actions);
-        });
-    liberty "load-id-given" ["ACT-31", "FACT-15"] "It sends the optional parameter loadId with pick where the vehicle lists it."
-        => plain().way(|(), site, vehicle, way, _, _| for stop in way.stops.iter_mut().filter(|_| is_roomy(vehicle)) {
+        => planning(|_, _, way| for (leg, stop) in way.legs.iter_mut().zip(way.stops.iter_mut().skip(1)) { stop.actions.append(&mut leg.actions); });
+    tolerance "load-id-given" ["ACT-31", "FACT-15"] "It sends the optional parameter loadId with pick where the vehicle lists it."
+        => planning(|site, vehicle, way| for stop in way.stops.iter_mut().filter(|_| is_roomy(vehicle)) {
             for pick in stop.actions.iter_mut().filter(|action| action["actionType"] == "pick") {
                 let listed = vehicle.offer("pick").and_then(|offer| offer.action_parameters.as_deref()).unwrap_or_default();
                 if listed.iter().any(|parameter| parameter.key == "loadId") && let Some(list) = pick["actionParameters"].as_array_mut() {
@@ -151,8 +125,8 @@ records! {
                 }
             }
         });
-    liberty "fine-positioning-before-pick" ["ACT-08", "FACT-15"] "It puts a finePositioning before each pick on a node where the vehicle offers it."
-        => plain().way(|(), site, vehicle, way, _, _| {
+    tolerance "fine-positioning-before-pick" ["ACT-08", "FACT-15"] "It puts a finePositioning before each pick on a node where the vehicle offers it."
+        => planning(|site, vehicle, way| {
             let offered = vehicle.offer("finePositioning").is_some() && site.offers(vehicle, "finePositioning", "NODE");
             let limit = vehicle.factsheet.as_ref().map_or(usize::MAX, |sheet| sheet.limit(&["node.actions"]));
             for stop in way.stops.iter_mut().filter(|stop| offered && is_roomy(vehicle) && stop.actions.len() < limit) {
@@ -162,23 +136,19 @@ records! {
             }
         });
     fault "pick-at-once" ["ACT-08", "FACT-15"] "Sends pick as an instant action."
-        => plain().way(|(), site, vehicle, way, _, _| at_once(site, vehicle, &mut way.stops, "pick"));
+        => planning(|site, vehicle, way| at_once(site, vehicle, &mut way.stops, "pick"));
     fault "drop-at-once-when-there" ["ACT-08", "FACT-15"] "When the vehicle stands at the goal already it sends drop as an instant action."
-        => plain().way(|(), site, vehicle, way, _, fresh| {
-            let there = fresh && way.legs.is_empty() && way.stops.first().is_some_and(|stop| stop.actions.len() == 1);
-            if there {
-                at_once(site, vehicle, &mut way.stops, "drop");
-            }
+        => planning_new(|site, vehicle, way| {
+            let there = way.legs.is_empty() && way.stops.first().is_some_and(|stop| stop.actions.len() == 1);
+            if there { at_once(site, vehicle, &mut way.stops, "drop"); }
         });
     fault "node-actions-limit-ignored" ["FACT-12"] "Gives a node more actions than the vehicle takes."
-        => plain().measures(|(), _, _, what, usual| if let Measure::Actions = what { usize::MAX } else { usual });
+        => unlimited(|what| matches!(what, Measure::Actions));
     fault "parameter-limit-ignored" ["FACT-12"] "Gives an action more parameters than the vehicle takes."
-        => plain().measures(|(), _, _, what, usual| if let Measure::Parameters = what { usize::MAX } else { usual });
-    liberty "generous-deviations" ["ORD-MSG-09"] "Nodes without actions have an allowedDeviationXY of 0.8 m where the vehicle supports it."
-        => plain().way(|(), _, _, way, _, fresh| for stop in way.stops.iter_mut().filter(|stop| fresh && stop.actions.is_empty()) {
-            stop.deviation_xy.get_or_insert(0.8);
-        });
-    liberty "second-leg-as-update-of-the-completed-order" ["ORD-MSG-02", "ORD-UPD-05"]
+        => unlimited(|what| matches!(what, Measure::Parameters));
+    tolerance "generous-deviations" ["ORD-MSG-09"] "Nodes without actions have an allowedDeviationXY of 0.8 m where the vehicle supports it."
+        => planning_new(|_, _, way| for stop in way.stops.iter_mut().filter(|stop| stop.actions.is_empty()) { stop.deviation_xy.get_or_insert(0.8); });
+    tolerance "second-leg-as-update-of-the-completed-order" ["ORD-MSG-02", "ORD-UPD-05"]
         "It sends the way to the first station as an order without horizon and, when that is completed, the rest as an update that begins at the last node."
         => keep::<Option<usize>>().happens(|halt, _, vehicle, event| match event {
             Event::Planned(running) => *halt = first_leg(running),
@@ -187,15 +157,11 @@ records! {
                 let Some(state) = &vehicle.state else { return };
                 let pending = |id: &str| state.action(id).is_some_and(|action| !action.is_terminal());
                 let there = state.order_id == running.id && state.route_empty();
-                if there && running.reached(Some(state)) + 1 >= halt.unwrap_or(0) && !running.action_ids().any(pending) {
-                    *halt = None;
-                }
+                if there && running.reached(Some(state)) + 1 >= halt.unwrap_or(0) && !running.action_ids().any(pending) { *halt = None; }
             }
             _ => {}
         }).measures(|halt, _, _, what, usual| if let Measure::Free = what { usual.min(halt.unwrap_or(usize::MAX)) } else { usual })
-        .window(|halt, _, _, running, window, free| if halt.is_some() && running.released == 0 {
-            (window.released, window.end) = (free, free);
-        });
+        .shows(|halt, _, _, running, window, free| if halt.is_some() && running.released == 0 { (window.released, window.end) = (free, free); });
     fault "interval-within-order-only" ["FACT-13"] "Keeps minOrderInterval between the messages of one order only."
         => at_any_time(|_, occasion| occasion == Occasion::New);
     fault "order-interval-ignored" ["FACT-13"] "Does not keep the interval between orders."
@@ -210,42 +176,34 @@ records! {
         => at_any_time(|called_off, occasion| called_off && occasion == Occasion::New);
     fault "interval-in-milliseconds" ["FACT-13"] "It takes minOrderInterval for milliseconds."
         => plain().lasts(|(), _, _, what, usual| if let Span::Interval(_) = what { usual / 1000 } else { usual });
-    liberty "answers-slowly" ["ORD-UPD-02"] "Looks at a message half a second after it came."
+    tolerance "answers-slowly" ["ORD-UPD-02"] "Looks at a message half a second after it came."
         => plain().configures(|config| config.answers_after = Duration::from_millis(500));
-    liberty "no-horizon" ["ORD-09"] "Sends the base only."
+    tolerance "no-horizon" ["ORD-09"] "Sends the base only."
         => plain().configures(|config| config.horizon_length = 0);
-    liberty "long-horizon" ["ORD-09"] "Sends the whole way as horizon."
+    tolerance "long-horizon" ["ORD-09"] "Sends the whole way as horizon."
         => plain().configures(|config| config.horizon_length = usize::MAX);
-    liberty "horizon-of-one-node" ["ORD-09"] "It never shows more than one node of the horizon."
+    tolerance "horizon-of-one-node" ["ORD-09"] "It never shows more than one node of the horizon."
         => plain().configures(|config| config.horizon_length = config.horizon_length.min(1));
-    liberty "whole-base" ["ORD-UPD-02"] "Releases the whole way at once."
+    tolerance "whole-base" ["ORD-UPD-02"] "Releases the whole way at once."
         => plain().configures(|config| config.base_length = usize::MAX);
-    liberty "resends-once" ["ORD-REJ-18"] "Sends an order again, unchanged, that was not seen within a second."
+    tolerance "resends-once" ["ORD-REJ-18"] "Sends an order again, unchanged, that was not seen within a second."
         => plain().configures(|config| (config.resend_after, config.resend_limit) = (Duration::from_secs(1), 1));
-    liberty "small-steps" ["ORD-UPD-02", "ORD-UPD-04"] "Keeps a longer base and extends it at every node."
-        => plain().configures(|config| config.base_length = config.base_length.max(4)).allows(|(), site, _, what, usual| match what {
-            Permission::Grow(_, ahead, _) => usual || ahead < site.config.base_length,
-            _ => usual,
-        });
-    liberty "whole-way-released" ["ORD-09", "ORD-UPD-02"] "It releases the whole way with the first message of an order."
-        => plain().window(|(), _, _, running, window, free| if running.released == 0 {
-            (window.released, window.end) = (free, free);
-        });
-    liberty "horizon-to-the-goal" ["ORD-09", "ORD-UPD-02"] "It shows the whole rest of the way as horizon."
-        => plain().window(|(), _, _, _, window, free| window.end = free);
-    liberty "first-order-without-horizon" ["ORD-09", "ORD-UPD-02"] "It sends the first message of an order without horizon and extends the base by updates."
-        => plain().window(|(), _, _, running, window, _| if running.released == 0 {
-            window.end = window.released;
-        });
-    liberty "one-node-first" ["ORD-02", "ORD-MSG-06"] "It first sends an order with only the node where the vehicle stands and adds the way by an update."
-        => plain().window(|(), _, _, running, window, _| if running.released == 0 {
-            (window.released, window.end) = (1, 1);
-        });
-    liberty "factsheet-awaited" ["OPT-03", "FACT-15"] "It begins no order before it has the factsheet of the vehicle."
-        => plain().allows(|(), _, vehicle, what, usual| usual && !(matches!(what, Permission::Begin) && vehicle.factsheet.is_none()));
-    liberty "no-new-order-while-paused" ["TOPIC-13"] "It begins no new order while the vehicle is paused."
-        => plain().allows(|(), _, vehicle, what, usual| usual && !(matches!(what, Permission::Begin) && vehicle.is_paused()));
-    liberty "pause-after-cancel-before-next-order" ["TOPIC-13", "ORD-CANCEL-17"] "It waits some seconds after a finished cancelOrder before it sends the next order."
+    tolerance "small-steps" ["ORD-UPD-02", "ORD-UPD-04"] "Keeps a longer base and extends it at every node."
+        => letting(|site, _, what| matches!(what, Permission::Grow(_, ahead, _) if ahead < site.config.base_length))
+            .configures(|config| config.base_length = config.base_length.max(4));
+    tolerance "whole-way-released" ["ORD-09", "ORD-UPD-02"] "It releases the whole way with the first message of an order."
+        => showing(|_, running, window, free| if running.released == 0 { (window.released, window.end) = (free, free); });
+    tolerance "horizon-to-the-goal" ["ORD-09", "ORD-UPD-02"] "It shows the whole rest of the way as horizon."
+        => showing(|_, _, window, free| window.end = free);
+    tolerance "first-order-without-horizon" ["ORD-09", "ORD-UPD-02"] "It sends the first message of an order without horizon and extends the base by updates."
+        => showing(|_, running, window, _| if running.released == 0 { window.end = window.released; });
+    tolerance "one-node-first" ["ORD-02", "ORD-MSG-06"] "It first sends an order with only the node where the vehicle stands and adds the way by an update."
+        => showing(|_, running, window, _| if running.released == 0 { (window.released, window.end) = (1, 1); });
+    tolerance "factsheet-awaited" ["OPT-03", "FACT-15"] "It begins no order before it has the factsheet of the vehicle."
+        => forbidding(|_, vehicle, what| matches!(what, Permission::Begin) && vehicle.factsheet.is_none());
+    tolerance "no-new-order-while-paused" ["TOPIC-13"] "It begins no new order while the vehicle is paused."
+        => forbidding(|_, vehicle, what| matches!(what, Permission::Begin) && vehicle.is_paused());
+    tolerance "pause-after-cancel-before-next-order" ["TOPIC-13", "ORD-CANCEL-17"] "It waits some seconds after a finished cancelOrder before it sends the next order."
         => keep::<Option<Moment>>().happens(|due, site, vehicle, event| match event {
             Event::Ended(_, true) => {
                 *due = Some(site.now.moment + Duration::from_secs(3));
@@ -254,25 +212,19 @@ records! {
             Event::Looked => again_at(*due, site, vehicle),
             _ => {}
         }).allows(not_before);
-    liberty "dispatches-after-two-seconds" ["TOPIC-13"] "It sends an order two seconds after the operator asked for it."
+    tolerance "dispatches-after-two-seconds" ["TOPIC-13"] "It sends an order two seconds after the operator asked for it."
         => keep::<Option<Moment>>().asked(|due, site, _vehicle, command, _| {
-            if command == "dispatch" {
-                *due = Some(site.now.moment + Duration::from_secs(2));
-            }
+            if command == "dispatch" { *due = Some(site.now.moment + Duration::from_secs(2)); }
             true
-        }).happens(|due, site, vehicle, event| if let Event::Looked = event {
-            again_at(*due, site, vehicle);
-        }).allows(not_before);
-    liberty "latest-transport-first" ["TOPIC-13", "ORD-MSG-02"] "It begins the transport asked for last before those that wait longer."
+        }).happens(|due, site, vehicle, event| if let Event::Looked = event { again_at(*due, site, vehicle); }).allows(not_before);
+    tolerance "latest-transport-first" ["TOPIC-13", "ORD-MSG-02"] "It begins the transport asked for last before those that wait longer."
         => plain().asked(|(), site, vehicle, command, arguments| {
             let Some(latest) = transport(vehicle, arguments).filter(|_| command == "dispatch") else { return true };
             site.dispatch(vehicle, latest);
-            if vehicle.queue.front().is_some_and(|next| !next.follows) && let Some(latest) = vehicle.queue.pop_back() {
-                vehicle.queue.push_front(latest);
-            }
+            if vehicle.queue.front().is_some_and(|next| !next.follows) && let Some(latest) = vehicle.queue.pop_back() { vehicle.queue.push_front(latest); }
             false
         });
-    liberty "pick-and-drop-apart" ["ORD-MSG-02", "TOPIC-13"] "A transport from one station to another is done in two orders, one for the pick and one for the drop."
+    tolerance "pick-and-drop-apart" ["ORD-MSG-02", "TOPIC-13"] "A transport from one station to another is done in two orders, one for the pick and one for the drop."
         => plain().asked(|(), site, vehicle, command, arguments| {
             let whole = transport(vehicle, arguments).filter(|whole| command == "dispatch" && whole.action.is_none());
             let Some((whole, from)) = whole.and_then(|whole| Some((whole.clone(), whole.from?))) else { return true };
@@ -283,70 +235,45 @@ records! {
             site.dispatch(vehicle, drop);
             false
         });
-    liberty "long-ways-in-two-orders" ["ORD-MSG-02", "ORD-02"] "It drives a long way in two orders one after the other."
+    tolerance "long-ways-in-two-orders" ["ORD-MSG-02", "ORD-02"] "It drives a long way in two orders one after the other."
         => plain().asked(|(), site, vehicle, command, arguments| {
             let plain = |whole: &Transport| whole.from.is_none() && whole.action.is_none() && whole.load_type.is_none();
             let idle = vehicle.running.is_none() && vehicle.queue.is_empty();
             let whole = transport(vehicle, arguments).filter(|whole| command == "dispatch" && idle && plain(whole));
-            let Some((whole, halfway)) = whole.and_then(|whole| Some((whole.clone(), halfway(site, vehicle, &whole.to)?))) else {
-                return true;
-            };
+            let Some((whole, halfway)) = whole.and_then(|whole| Some((whole.clone(), halfway(site, vehicle, &whole.to)?))) else { return true; };
             site.dispatch(vehicle, Transport { to: halfway, ..whole.clone() });
             site.dispatch(vehicle, Transport { follows: true, ..whole });
             false
         });
-    liberty "asks-for-states" ["ACT-08"] "Asks for a state when it has begun an order."
-        => plain().happens(|(), site, vehicle, event| if let Event::Begun = event {
-            site.instant(vehicle, "stateRequest", &Value::Null);
-        });
-    liberty "asks-for-factsheet" ["ACT-08"] "Asks for the factsheet although it has one."
-        => plain().happens(|(), site, vehicle, event| if let Event::Begun = event {
-            site.instant(vehicle, "factsheetRequest", &Value::Null);
-        });
+    tolerance "asks-for-states" ["ACT-08"] "Asks for a state when it has begun an order."
+        => begun(|site, vehicle| { site.instant(vehicle, "stateRequest", &Value::Null); });
+    tolerance "asks-for-factsheet" ["ACT-08"] "Asks for the factsheet although it has one."
+        => begun(|site, vehicle| { site.instant(vehicle, "factsheetRequest", &Value::Null); });
 }
 
 /// Pauses every vehicle of the fleet, or lets all go on.
-struct PauseForAll;
-
-impl Deviation for PauseForAll {
-    fn asked(
-        &mut self,
-        site: &mut Site,
-        fleet: &mut [Vehicle],
-        _: Option<usize>,
-        command: &str,
-        arguments: &Value,
-    ) -> bool {
+fn pauses_all() -> Box<dyn Deviation> {
+    plain().commanded(|(), site, fleet, command, arguments| {
         let concerned = matches!(command, "pause" | "resume");
         for vehicle in fleet.iter_mut().filter(|_| concerned) {
             site.vehicle_command(vehicle, command, arguments);
         }
         !concerned
-    }
+    })
 }
 
 /// Sends order messages without regard to minOrderInterval, knowing whether the last order was called off.
 fn at_any_time(when: fn(bool, Occasion) -> bool) -> Box<dyn Deviation> {
-    struct AtAnyTime(fn(bool, Occasion) -> bool, BTreeMap<String, bool>);
-    impl Deviation for AtAnyTime {
-        fn happens(&mut self, _: &mut Site, vehicle: &mut Vehicle, event: &mut Event<'_>) {
-            let called_off = self.1.entry(vehicle.config.serial_number.clone()).or_default();
-            match event {
-                Event::Ended(_, true) => *called_off = true,
-                Event::Begun => *called_off = false,
-                _ => {}
-            }
-        }
-
-        fn lasts(&self, _: &Site, vehicle: &Vehicle, what: Span, usual: Duration) -> Duration {
-            let called_off = self.1.get(&vehicle.config.serial_number).copied().unwrap_or_default();
-            match what {
-                Span::Interval(occasion) if self.0(called_off, occasion) => Duration::ZERO,
-                _ => usual,
-            }
-        }
-    }
-    Box::new(AtAnyTime(when, BTreeMap::new()))
+    each((when, false))
+        .happens(|(_, called_off), _, _, event| match event {
+            Event::Ended(_, true) => *called_off = true,
+            Event::Begun => *called_off = false,
+            _ => {}
+        })
+        .lasts(|(when, called_off), _, _, what, usual| match what {
+            Span::Interval(occasion) if when(*called_off, occasion) => Duration::ZERO,
+            _ => usual,
+        })
 }
 
 fn numbered(id: String, begun: u32) -> String {

@@ -1,13 +1,6 @@
 //! Deviations of the header: what names the vehicle, counts the messages, and tells time and version (section 6.4).
 
-use super::hooks::{Object, every, fleet, instant, keep, order, plain, update};
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use crate::master_control::Site;
-use crate::master_control::seam::{Deviation, Event, Outgoing};
-use crate::master_control::vehicle::Vehicle;
-use serde_json::{Value, json};
-use std::collections::BTreeMap;
+use super::prelude::*;
 
 records! {
     fault "version-missing" ["HDR-01", "HDR-04"] "Leaves the version out of its orders."
@@ -15,11 +8,10 @@ records! {
     fault "timestamp-missing" ["HDR-01", "HDR-03"] "Leaves the timestamp out of its instant actions."
         => instant(|m| m.unset("timestamp"));
     fault "header-nested" ["HDR-01"] "Puts the header into an object of its own."
-        => plain().sends(|_, _, _, out| {
+        => sending(|_, _, out| {
             let (header, body) = std::mem::take(&mut out.message).into_iter().partition(|(key, _)| HEADER.contains(&key.as_str()));
             out.message = body;
             out.message.set("header", Value::Object(header));
-            true
         });
     fault "header-id-constant" ["HDR-02"] "Never raises the headerId."
         => every(|m| m.set("headerId", 0));
@@ -40,53 +32,33 @@ records! {
     fault "header-id-negative" ["JSON-09", "HDR-02"] "Counts the headerId as a signed number, from below zero."
         => every(|m| m.change("headerId", |id| *id = json!(id.as_i64().unwrap_or_default() - 1_000_000)));
     fault "header-id-from-clock" ["HDR-02", "JSON-09", "JSON-10"] "headerId is the time in milliseconds, which neither counts by one nor fits 32 bits."
-        => plain().sends(|_, site, _, out| {
-            out.message.set("headerId", site.now.utc.as_millisecond());
-            true
-        });
+        => sending(|site, _, out| out.message.set("headerId", site.now.utc.as_millisecond()));
     fault "header-id-beyond-32-bits" ["JSON-09", "HDR-02"] "It counts the headerId of instant actions from 4294967296 on."
         => instant(|m| m.change("headerId", |id| *id = json!(id.as_u64().unwrap_or_default() + (1 << 32))));
     fault "header-id-kept-on-resend" ["HDR-02"] "An order that is sent again keeps the headerId of its first transmission."
-        => plain().sends(|_, _, vehicle, out| {
-            if out.again && let Some(next) = vehicle.header_ids.get_mut("order") {
-                *next = next.wrapping_sub(1);
-                out.message.set("headerId", next.wrapping_sub(1));
-            }
-            true
+        => sending(|_, vehicle, out| if out.again && let Some(next) = vehicle.header_ids.get_mut("order") {
+            *next = next.wrapping_sub(1);
+            out.message.set("headerId", next.wrapping_sub(1));
         });
     fault "header-id-is-update-id" ["HDR-02"] "It writes the orderUpdateId of an order into its headerId, so that the headerId is 0 again with every new order."
         => order(|m| m.set("headerId", m["orderUpdateId"].clone()));
     fault "header-id-restarts-per-order" ["HDR-02"] "It begins the headerId of the order topic anew with each new order."
-        => plain().sends(|_, _, vehicle, out| {
-            if out.is_new_order() {
-                vehicle.header_ids.insert("order", 1);
-                out.message.set("headerId", 0);
-            }
-            true
+        => sending(|_, vehicle, out| if out.is_new_order() {
+            vehicle.header_ids.insert("order", 1);
+            out.message.set("headerId", 0);
         });
     fault "header-id-skips-in-updates" ["HDR-02"] "It raises the headerId by two with each order update."
-        => plain().sends(|_, _, vehicle, out| {
-            if out.is_update() && let Some(next) = vehicle.header_ids.get_mut("order") {
-                out.message.set("headerId", *next);
-                *next += 1;
-            }
-            true
+        => sending(|_, vehicle, out| if out.is_update() && let Some(next) = vehicle.header_ids.get_mut("order") {
+            out.message.set("headerId", *next);
+            *next += 1;
         });
     fault "header-id-counts-actions" ["HDR-02"] "Raises headerId by the number of instant actions in a message."
-        => plain().sends(|_, _, vehicle, out| {
+        => sending(|_, vehicle, out| {
             let actions = out.message.list("actions").len();
-            if let Some(next) = vehicle.header_ids.get_mut(out.name) {
-                *next += u32::try_from(actions.saturating_sub(1)).unwrap_or_default();
-            }
-            true
+            if let Some(next) = vehicle.header_ids.get_mut(out.name) { *next += u32::try_from(actions.saturating_sub(1)).unwrap_or_default(); }
         });
     fault "header-id-missing-in-cancel" ["HDR-01", "JSON-10", "IACT-01"] "Messages with cancelOrder have no headerId."
-        => plain().sends(|_, _, _, out| {
-            if out.tells(&["cancelOrder"]) {
-                out.message.unset("headerId");
-            }
-            true
-        });
+        => cancel(|m| m.unset("headerId"));
     fault "timestamp-local" ["HDR-03"] "Gives timestamps in local time with an offset."
         => local("+01:00");
     fault "local-time-marked-as-utc" ["HDR-03"] "It writes its local time into the timestamp and puts a Z behind it."
@@ -104,10 +76,7 @@ records! {
     fault "timestamp-with-comma" ["HDR-03"] "It writes a comma instead of the dot before the fraction of the seconds in its timestamps."
         => every(|m| time(m, |text| text.replace('.', ",")));
     fault "timestamp-unix" ["HDR-03", "JSON-06"] "Gives timestamps as seconds since 1970."
-        => plain().sends(|_, site, _, out| {
-            out.message.set("timestamp", site.now.utc.as_second());
-            true
-        });
+        => sending(|site, _, out| out.message.set("timestamp", site.now.utc.as_second()));
     fault "version-short" ["HDR-04"] "Gives the version without its last part."
         => every(|m| version(m, |text| text.rsplit_once('.').map_or(text, |(short, _)| short).to_owned()));
     fault "instant-action-version-two-numbers" ["HDR-04"] "It gives the version in instantActions messages as 2.1."
@@ -117,42 +86,29 @@ records! {
     fault "version-of-four-parts" ["HDR-04"] "It writes the protocol version with a fourth part, such as 2.1.0.0."
         => every(|m| version(m, |text| format!("{text}.0")));
     fault "own-name-in-header" ["HDR-05"] "Names itself in the header instead of the vehicle."
-        => plain().sends(|_, site, _, out| {
+        => sending(|site, _, out| {
             out.message.set("manufacturer", site.config.name.clone());
             out.message.set("serialNumber", "1");
-            true
         });
     fault "fleet-name-in-instant-action-header" ["HDR-05", "TOPIC-04"] "It writes its own name as manufacturer into the header of instantActions messages."
-        => plain().sends(|_, site, _, out| {
-            if out.name == "instantActions" {
-                out.message.set("manufacturer", site.config.name.clone());
-            }
-            true
-        });
+        => sending(|site, _, out| if out.name == "instantActions" { out.message.set("manufacturer", site.config.name.clone()); });
     fault "header-of-first-vehicle" ["HDR-05", "TOPIC-04"] "The header of messages to any vehicle names the first vehicle of the fleet."
-        => plain().sends(|_, site, _, out| {
-            if let Some(first) = site.config.vehicles.first() {
-                out.message.set("manufacturer", first.manufacturer.clone());
-                out.message.set("serialNumber", first.serial_number.clone());
-            }
-            true
+        => sending(|site, _, out| if let Some(first) = site.config.vehicles.first() {
+            out.message.set("manufacturer", first.manufacturer.clone());
+            out.message.set("serialNumber", first.serial_number.clone());
         });
     fault "header-of-the-other-vehicle-in-updates" ["HDR-05", "TOPIC-04"]
         "It puts into an order update the serial number of the vehicle that it has addressed before, so that with two vehicles at work the header names the wrong one."
         => fleet::<String>().sends(|addressed, _, vehicle, out| {
             let other = std::mem::replace(addressed, vehicle.config.serial_number.clone());
-            if out.is_update() && !other.is_empty() {
-                out.message.set("serialNumber", other);
-            }
+            if out.is_update() && !other.is_empty() { out.message.set("serialNumber", other); }
             true
         });
     fault "header-of-other-vehicle" ["HDR-05", "TOPIC-04"] "It puts into instantActions messages the serialNumber of the vehicle that got the last order."
         => fleet::<String>().sends(|ordered, _, vehicle, out| {
             if out.name == "order" {
                 ordered.clone_from(&vehicle.config.serial_number);
-            } else if !ordered.is_empty() {
-                out.message.set("serialNumber", ordered.clone());
-            }
+            } else if !ordered.is_empty() { out.message.set("serialNumber", ordered.clone()); }
             true
         });
     fault "other-serial-number" ["HDR-05", "TOPIC-04"] "Names another serial number in the header than in the topic."
@@ -178,30 +134,20 @@ records! {
             m.set("manufacturer", serial);
         });
     fault "serial-number-missing-in-resend" ["HDR-01"] "It leaves serialNumber out of the header of an order that is sent again because it was lost."
-        => plain().sends(|_, _, _, out| {
-            if out.again {
-                out.message.unset("serialNumber");
-            }
-            true
-        });
+        => resent(|m| m.unset("serialNumber"));
     fault "manufacturer-missing-in-updates" ["HDR-01", "HDR-05", "JSON-10", "ORD-MSG-01"] "Order updates have no manufacturer in the header."
         => update(|m| m.unset("manufacturer"));
-    liberty "header-id-from-thousand" ["HDR-02"] "Begins to count its messages at 1000."
+    tolerance "header-id-from-thousand" ["HDR-02"] "Begins to count its messages at 1000."
         => every(|m| m.change("headerId", |id| *id = json!(id.as_u64().unwrap_or_default() + 1000)));
-    liberty "header-id-high" ["HDR-02", "JSON-09"] "It counts headerId from 4000000000."
+    tolerance "header-id-high" ["HDR-02", "JSON-09"] "It counts headerId from 4000000000."
         => every(|m| m.change("headerId", |id| *id = json!(id.as_u64().unwrap_or_default() + 4_000_000_000)));
-    liberty "header-id-restarts" ["HDR-02"] "Counts its messages from 0 again on every connection."
-        => plain().happens(|_, _, vehicle, event| {
-            if let Event::Connected(_) = event {
-                vehicle.header_ids.clear();
-            }
-        });
-    liberty "whole-second-timestamps" ["HDR-03"] "Its clock has a resolution of a second: the two digits of the fraction are always zero."
-        => plain().sends(|_, site, _, out| {
+    tolerance "header-id-restarts" ["HDR-02"] "Counts its messages from 0 again on every connection."
+        => happening(|_, vehicle, event| if let Event::Connected(_) = event { vehicle.header_ids.clear(); });
+    tolerance "whole-second-timestamps" ["HDR-03"] "Its clock has a resolution of a second: the two digits of the fraction are always zero."
+        => sending(|site, _, out| {
             let utc = site.now.utc;
             let seconds = jiff::Timestamp::from_second(utc.as_second()).unwrap_or(utc);
             out.message.set("timestamp", format!("{seconds:.2}"));
-            true
         });
 }
 
@@ -217,19 +163,11 @@ fn version(message: &mut Object, written: fn(&str) -> String) {
 }
 
 /// Writes the time of a zone an hour ahead, with this behind it.
-struct LocalTime(&'static str);
-
 fn local(zone: &'static str) -> Box<dyn Deviation> {
-    Box::new(LocalTime(zone))
-}
-
-impl Deviation for LocalTime {
-    fn publishes(&mut self, site: &mut Site, _: &mut Vehicle, outgoing: &mut Outgoing) -> bool {
+    holding(zone).sends(|zone, site, _, out| {
         let utc = site.now.utc;
         let local = utc.checked_add(jiff::SignedDuration::from_hours(1)).unwrap_or(utc);
-        outgoing
-            .message
-            .set("timestamp", format!("{local:.2}").replace('Z', self.0));
+        out.message.set("timestamp", format!("{local:.2}").replace('Z', zone));
         true
-    }
+    })
 }

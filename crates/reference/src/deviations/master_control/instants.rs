@@ -1,11 +1,6 @@
 //! Deviations of which instant actions are sent, and when (section 6.9).
 
-use super::hooks::{has_low_battery, keep, plain};
-use crate::deviations::record::Record;
-use crate::master_control::Site;
-use crate::master_control::seam::{Deviation, Event, Measure, Permission};
-use crate::master_control::vehicle::Vehicle;
-use serde_json::{Value, json};
+use super::prelude::*;
 
 records! {
     fault "position-during-order" ["IACT-02"] "Sets the position of a vehicle that drives an order."
@@ -39,15 +34,15 @@ records! {
         });
     fault "pause-waits-for-standstill" ["TOPIC-13"] "It holds a requested startPause back until the vehicle stands still."
         because "TOPIC-13 says where a startPause is sent, and names no time by which it has to be."
-        => plain().allows(|(), _, vehicle, what, usual| {
+        => forbidding(|_, vehicle, what| {
             let drives = vehicle.state.as_ref().is_some_and(|state| state.driving);
-            usual && !(drives && matches!(what, Permission::Tell("startPause")))
+            drives && matches!(what, Permission::Tell("startPause"))
         });
     fault "instant-actions-limit-ignored" ["FACT-12"] "Sends more instant actions at once than the vehicle takes."
-        => plain().measures(|(), _, _, what, usual| if let Measure::Instants = what { usize::MAX } else { usual });
-    liberty "instant-actions-one-by-one" ["IACT-01"] "Every instant action is sent in a message of its own."
-        => plain().measures(|(), _, _, what, usual| if let Measure::Instants = what { 1 } else { usual });
-    liberty "pause-together-with-state-request" ["IACT-01", "ACT-08"] "It sends startPause and stateRequest in one instantActions message."
+        => unlimited(|what| matches!(what, Measure::Instants));
+    tolerance "instant-actions-one-by-one" ["IACT-01"] "Every instant action is sent in a message of its own."
+        => measuring(|_, what, usual| if let Measure::Instants = what { 1 } else { usual });
+    tolerance "pause-together-with-state-request" ["IACT-01", "ACT-08"] "It sends startPause and stateRequest in one instantActions message."
         => plain().asked(|(), site, vehicle, command, _| {
             if command == "pause" {
                 site.instant(vehicle, "startPause", &Value::Null);
@@ -55,7 +50,7 @@ records! {
             }
             command != "pause"
         });
-    liberty "pause-sent-twice" ["ORD-MSG-17", "IACT-01"] "It sends startPause a second time, with its own actionId, while the first is not reported finished."
+    tolerance "pause-sent-twice" ["ORD-MSG-17", "IACT-01"] "It sends startPause a second time, with its own actionId, while the first is not reported finished."
         => plain().asked(|(), site, vehicle, command, _| {
             if command == "pause" {
                 site.instant(vehicle, "startPause", &Value::Null);
@@ -67,11 +62,7 @@ records! {
 
 /// Sends instant actions beside an order, by vehicle and type.
 fn beside(when: fn(&Vehicle, &str) -> bool) -> Box<dyn Deviation> {
-    struct Beside(fn(&Vehicle, &str) -> bool);
-    impl Deviation for Beside {
-        fn allows(&self, _: &Site, vehicle: &Vehicle, what: Permission<'_>, usual: bool) -> bool {
-            usual || matches!(what, Permission::Beside(kind) if self.0(vehicle, kind))
-        }
-    }
-    Box::new(Beside(when))
+    holding(when).allows(|when, _, vehicle, what, usual| {
+        usual || matches!(what, Permission::Beside(kind) if when(vehicle, kind))
+    })
 }

@@ -1,16 +1,12 @@
 //! Deviations of maps: their roll-out, their use, and the position on a new one (section 6.7).
 
-use super::hooks::{Object, fleet, keep, made, plain, scale};
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use crate::master_control::Site;
-use crate::master_control::maps::is_duplicate;
-use crate::master_control::seam::{Deviation, Event, Permission};
-use crate::master_control::seen::MapSeen;
-use crate::master_control::vehicle::{MapJob, Presence, Running, Stage, Vehicle};
-use serde_json::{Value, json};
-use std::collections::BTreeSet;
 use std::f64::consts::PI;
+
+use crate::master_control::maps::is_duplicate;
+use crate::master_control::seen::MapSeen;
+use crate::master_control::vehicle::{MapJob, Stage};
+
+use super::prelude::*;
 
 records! {
     fault "map-not-enabled" ["MAP-09"] "Sends orders on maps that are not enabled."
@@ -31,25 +27,15 @@ records! {
         => keep::<bool>().happens(|begun, _, _, event| *begun |= matches!(event, Event::Begun))
             .allows(|begun, _, _, what, usual| usual || (*begun && matches!(what, Permission::UseMap(..))));
     fault "enabled-for-fleet" ["MAP-09"] "Takes a map for enabled on every vehicle once one of them has enabled it."
-        => fleet::<BTreeSet<String>>().happens(|enabled, _, vehicle, event| if let Event::State(_) = event {
-            enabled.extend(enabled_maps(vehicle));
-        }).allows(remembered);
+        => fleet::<BTreeSet<String>>().happens(|enabled, _, vehicle, event| if let Event::State(_) = event { enabled.extend(enabled_maps(vehicle)); }).allows(remembered);
     fault "map-enabled-for-ever" ["MAP-09"] "It takes a map for enabled that a vehicle once reported as ENABLED, also after it reports it as DISABLED."
-        => keep::<BTreeSet<String>>().happens(|enabled, _, vehicle, event| if let Event::State(_) = event {
-            enabled.extend(enabled_maps(vehicle));
-        }).allows(remembered);
+        => keep::<BTreeSet<String>>().happens(|enabled, _, vehicle, event| if let Event::State(_) = event { enabled.extend(enabled_maps(vehicle)); }).allows(remembered);
     fault "map-remembered-over-reconnect" ["MAP-09"] "It remembers a map as ENABLED over a reconnect of the vehicle and does not look at maps again."
-        => keep::<BTreeSet<String>>().happens(|enabled, _, vehicle, event| if let Event::Online(Presence::Away) = event {
-            enabled.extend(enabled_maps(vehicle));
-        }).allows(remembered);
+        => keep::<BTreeSet<String>>().happens(|enabled, _, vehicle, event| if let Event::Online(Presence::Away) = event { enabled.extend(enabled_maps(vehicle)); }).allows(remembered);
     fault "enable-map-taken-for-done" ["MAP-09"] "Once enableMap was reported FINISHED it sends orders on that map although the state shows it as disabled."
-        => keep::<BTreeSet<String>>().happens(|enabled, _, _, event| if let Event::Enabled(map_id, true) = event {
-            enabled.insert((*map_id).to_owned());
-        }).allows(remembered);
+        => keep::<BTreeSet<String>>().happens(|enabled, _, _, event| if let Event::Enabled(map_id, true) = event { enabled.insert((*map_id).to_owned()); }).allows(remembered);
     fault "order-after-failed-enable-map" ["MAP-09"] "It sends the order although enableMap was reported FAILED."
-        => keep::<BTreeSet<String>>().happens(|enabled, _, _, event| if let Event::Enabled(map_id, false) = event {
-            enabled.insert((*map_id).to_owned());
-        }).allows(remembered);
+        => keep::<BTreeSet<String>>().happens(|enabled, _, _, event| if let Event::Enabled(map_id, false) = event { enabled.insert((*map_id).to_owned()); }).allows(remembered);
     fault "map-not-preloaded" ["MAP-10"] "Rolls a map out when an order needs it."
         because "It breaks a recommendation only."
         => plain().asked(|(), _, _, command, _| command != "download-map");
@@ -58,12 +44,10 @@ records! {
         => plain().asked(|(), _, vehicle, command, _| command != "download-map" || vehicle.running.is_none());
     fault "enable-before-download" ["MAP-10"] "It sends enableMap for a map it rolls out before downloadMap."
         because "MAP-10 recommends that a map is on board before it is activated, and obliges nobody."
-        => plain().happens(|(), site, vehicle, event| if let Event::RollOut(map, _) = event {
-            site.map_action(vehicle, "enableMap", &map.map_id, &map.map_version);
-        });
-    liberty "on-board-map-deleted-first" ["MAP-28"]
+        => happening(|site, vehicle, event| if let Event::RollOut(map, _) = event { site.map_action(vehicle, "enableMap", &map.map_id, &map.map_version); });
+    tolerance "on-board-map-deleted-first" ["MAP-28"]
         "It deletes a disabled map that is on board already before it has it downloaded again, without waiting for a rejection."
-        => plain().happens(|(), site, vehicle, event| if let Event::RollOut(map, done) = event {
+        => happening(|site, vehicle, event| if let Event::RollOut(map, done) = event {
             let same = |seen: &&MapSeen| seen.map_id == map.map_id && seen.map_version == map.map_version;
             let unused = on_board(vehicle).find(same).is_some_and(|seen| seen.map_status == "DISABLED");
             let deletes = unused.then(|| site.map_action(vehicle, "deleteMap", &map.map_id, &map.map_version)).flatten();
@@ -74,7 +58,7 @@ records! {
         });
     fault "download-link-relative" ["MAP-16"] "mapDownloadLink is a path without protocol and host."
         because "MAP-16 asks for a link; what a link must hold so that the vehicle can follow it is not said."
-        => made(|_, _, kind, a| if kind == "downloadMap" {
+        => made_of("downloadMap", |_, a| {
             link(a, |link| match link.split_once("://") {
                 Some((_, rest)) => rest.find('/').map_or(rest, |at| &rest[at..]).to_owned(),
                 None => link.to_owned(),
@@ -82,18 +66,14 @@ records! {
         });
     fault "download-link-to-disk" ["MAP-16"] "It sends a path on its own disk as mapDownloadLink."
         because "MAP-16 asks for a link; whose disk it points to cannot be seen."
-        => made(|_, _, kind, a| if kind == "downloadMap" {
-            link(a, |link| format!("file:///var/maps/{}", link.rsplit('/').next().unwrap_or_default()));
-        });
-    liberty "map-hash-left-out" ["MAP-16", "ACT-31"] "It leaves the optional mapHash out of downloadMap."
-        => made(|_, _, kind, a| if kind == "downloadMap" {
-            a.keep("actionParameters", |parameter| !parameter.says("key", "mapHash"));
-        });
+        => made_of("downloadMap", |_, a| link(a, |link| format!("file:///var/maps/{}", link.rsplit('/').next().unwrap_or_default())));
+    tolerance "map-hash-left-out" ["MAP-16", "ACT-31"] "It leaves the optional mapHash out of downloadMap."
+        => made_of("downloadMap", |_, a| a.keep("actionParameters", |parameter| !parameter.says("key", "mapHash")));
     fault "download-repeated" ["MAP-28"] "Repeats a download that was refused as a duplicate without deleting the map."
         => on_duplicate(|site, vehicle, job| download_again(site, vehicle, job));
     fault "duplicate-kept-during-order" ["MAP-28"]
         "It repeats a download that was rejected as a duplicate without deleting the map first if the vehicle drives an order."
-        => plain().happens(|(), site, vehicle, event| if let Event::RolledOut(job, false, next, done) = event {
+        => happening(|site, vehicle, event| if let Event::RolledOut(job, false, next, done) = event {
             if job.stage == Stage::Download && vehicle.running.is_some() && is_duplicate(vehicle, job) {
                 **next = download_again(site, vehicle, job);
                 **done = true;
@@ -105,7 +85,7 @@ records! {
             site.map_action(vehicle, "deleteMap", &job.map.map_id, &job.map.map_version);
             next
         });
-    liberty "duplicate-left-alone" ["MAP-28"] "It gives a download up that was rejected as a duplicate."
+    tolerance "duplicate-left-alone" ["MAP-28"] "It gives a download up that was rejected as a duplicate."
         => on_duplicate(|_, _, _| None);
     fault "duplicate-other-version-deleted" ["MAP-28"]
         "After a download was rejected as a duplicate it deletes another version of that map and then repeats the download."
@@ -124,47 +104,41 @@ records! {
             site.map_action(vehicle, "deleteMap", &job.map.map_id, &version)
         });
     fault "download-after-failed-delete" ["MAP-28"] "It repeats a rejected download although the deletion of the duplicate was reported FAILED."
-        => plain().happens(|(), site, vehicle, event| if let Event::RolledOut(job, false, next, done) = event && job.stage == Stage::Delete {
+        => happening(|site, vehicle, event| if let Event::RolledOut(job, false, next, done) = event && job.stage == Stage::Delete {
             **next = download_again(site, vehicle, job);
             **done = true;
         });
     fault "repeated-download-without-link" ["MAP-16", "ACT-31", "FACT-15"] "The downloadMap that is repeated after a duplicate was deleted has no mapDownloadLink."
-        => plain().happens(|(), site, vehicle, event| if let Event::RolledOut(job, true, next, done) = event && job.stage == Stage::Delete {
+        => happening(|site, vehicle, event| if let Event::RolledOut(job, true, next, done) = event && job.stage == Stage::Delete {
             **next = download_again(site, vehicle, job);
             **done = true;
             let again = vehicle.instants.back_mut().and_then(|instant| instant.action.as_object_mut());
             again.into_iter().for_each(|again| again.keep("actionParameters", |parameter| !parameter.says("key", "mapDownloadLink")));
         });
     fault "delete-map-under-running-order" ["IACT-02"] "It sends deleteMap for the old version of a map whilst the vehicle still drives an order on it."
-        => plain().happens(|(), site, vehicle, event| if let Event::RolledOut(job, true, _, _) = event && job.stage != Stage::Delete {
+        => happening(|site, vehicle, event| if let Event::RolledOut(job, true, _, _) = event && job.stage != Stage::Delete {
             let map = job.map.clone();
             let version = enabled_version(vehicle, &map.map_id).filter(|version| *version != map.map_version);
             let driven = vehicle.running.as_ref().is_some_and(|running| running.stops.iter().any(|stop| stop.map_id == map.map_id));
-            if let Some(version) = version.filter(|_| driven) {
-                site.map_action(vehicle, "deleteMap", &map.map_id, &version);
-            }
+            if let Some(version) = version.filter(|_| driven) { site.map_action(vehicle, "deleteMap", &map.map_id, &version); }
         });
-    liberty "enables-after-download" ["MAP-09", "MAP-10"] "It enables a map of which no version is enabled as soon as its download has ended, while no order runs."
-        => plain().happens(|(), site, vehicle, event| if let Event::RolledOut(job, true, _, _) = event && job.stage != Stage::Delete {
+    tolerance "enables-after-download" ["MAP-09", "MAP-10"] "It enables a map of which no version is enabled as soon as its download has ended, while no order runs."
+        => happening(|site, vehicle, event| if let Event::RolledOut(job, true, _, _) = event && job.stage != Stage::Delete {
             let map = job.map.clone();
             let enabled = vehicle.state.as_ref().is_none_or(|state| state.map_enabled(&map.map_id));
             let free = vehicle.running.is_none() && !vehicle.enabling.contains_key(&map.map_id);
-            if !enabled && free && let Some(id) = site.map_action(vehicle, "enableMap", &map.map_id, &map.map_version) {
-                vehicle.enabling.insert(map.map_id, id);
-            }
+            if !enabled && free && let Some(id) = site.map_action(vehicle, "enableMap", &map.map_id, &map.map_version) { vehicle.enabling.insert(map.map_id, id); }
         });
-    liberty "preloads-maps" ["MAP-10", "MAP-16"] "It sends downloadMap unasked for each map of the site that the vehicle does not have."
-        => plain().happens(|(), site, vehicle, event| if let Event::Looked = event && site.commandable(vehicle) {
+    tolerance "preloads-maps" ["MAP-10", "MAP-16"] "It sends downloadMap unasked for each map of the site that the vehicle does not have."
+        => looked(|site, vehicle| if site.commandable(vehicle) {
             for map in site.config.maps.clone() {
                 let maps = vehicle.state.as_ref().and_then(|state| state.maps.as_ref());
                 let missing = maps.is_some_and(|maps| maps.iter().all(|seen| seen.map_id != map.map_id));
-                if missing && !map.link.is_empty() && vehicle.fetched.insert(map.map_id.clone()) {
-                    site.download_map(vehicle, map);
-                }
+                if missing && !map.link.is_empty() && vehicle.fetched.insert(map.map_id.clone()) { site.download_map(vehicle, map); }
             }
         });
-    liberty "enables-map-before-each-order" ["MAP-09"] "It sends enableMap for the map of the first node before every order, even if it is enabled."
-        => plain().happens(|(), site, vehicle, event| if let Event::Begins(running) = event {
+    tolerance "enables-map-before-each-order" ["MAP-09"] "It sends enableMap for the map of the first node before every order, even if it is enabled."
+        => happening(|site, vehicle, event| if let Event::Begins(running) = event {
             let map_id = running.stops[0].map_id.clone();
             if let Some(version) = enabled_version(vehicle, &map_id) {
                 site.map_action(vehicle, "enableMap", &map_id, &version);
@@ -172,11 +146,9 @@ records! {
             }
         });
     fault "no-position-on-new-map" ["MAP-27"] "Does not set the position of a vehicle on a new map."
-        => plain().happens(|(), _, vehicle, event| if let Event::Placing(given, done) = event {
-            **done = given["mapId"] != reported(vehicle);
-        });
+        => happening(|_, vehicle, event| if let Event::Placing(given, done) = event { **done = given["mapId"] != reported(vehicle); });
     fault "new-map-only-enabled" ["MAP-27"] "It only enables a new map, and sends no initPosition, when a vehicle is to be set to a position on it."
-        => plain().happens(|(), site, vehicle, event| if let Event::Placing(given, done) = event {
+        => happening(|site, vehicle, event| if let Event::Placing(given, done) = event {
             let (map_id, known) = (given["mapId"].as_str().unwrap_or_default().to_owned(), reported(vehicle));
             if map_id != known && !known.is_empty() {
                 let seen = on_board(vehicle).find(|seen| seen.map_id == map_id);
@@ -186,9 +158,7 @@ records! {
             }
         });
     fault "init-position-on-old-map" ["MAP-27"] "initPosition names the map the vehicle reports already, not the new one that was asked for."
-        => plain().happens(|(), _, vehicle, event| if let Event::Placing(given, _) = event && !reported(vehicle).is_empty() {
-            given["mapId"] = json!(reported(vehicle));
-        });
+        => happening(|_, vehicle, event| if let Event::Placing(given, _) = event && !reported(vehicle).is_empty() { given["mapId"] = json!(reported(vehicle)); });
     fault "init-position-in-degrees" ["MAP-02"] "theta of initPosition is in degrees."
         => places(|given| scale(given, "theta", 180.0 / PI));
     fault "init-theta-clockwise" ["MAP-01"] "It counts theta of initPosition clockwise."
@@ -197,13 +167,9 @@ records! {
 
 /// Uses maps then, too.
 fn uses(when: fn(&Vehicle, &str, &Running) -> bool) -> Box<dyn Deviation> {
-    struct Uses(fn(&Vehicle, &str, &Running) -> bool);
-    impl Deviation for Uses {
-        fn allows(&self, _: &Site, vehicle: &Vehicle, what: Permission<'_>, usual: bool) -> bool {
-            usual || matches!(what, Permission::UseMap(map_id, running) if self.0(vehicle, map_id, running))
-        }
-    }
-    Box::new(Uses(when))
+    holding(when).allows(|when, _, vehicle, what, usual| {
+        usual || matches!(what, Permission::UseMap(map_id, running) if when(vehicle, map_id, running))
+    })
 }
 
 fn remembered(enabled: &BTreeSet<String>, _: &Site, _: &Vehicle, what: Permission<'_>, usual: bool) -> bool {
@@ -212,34 +178,26 @@ fn remembered(enabled: &BTreeSet<String>, _: &Site, _: &Vehicle, what: Permissio
 
 /// Sets vehicles to another place.
 fn places(change: fn(&mut Object)) -> Box<dyn Deviation> {
-    struct Places(fn(&mut Object));
-    impl Deviation for Places {
-        fn happens(&mut self, _: &mut Site, _: &mut Vehicle, event: &mut Event<'_>) {
-            if let Event::Placing(Value::Object(given), _) = event {
-                self.0(given);
-            }
+    holding(change).happens(|change, _, _, event| {
+        if let Event::Placing(Value::Object(given), _) = event {
+            change(given);
         }
-    }
-    Box::new(Places(change))
+    })
 }
 
 type AfterDuplicate = fn(&mut Site, &mut Vehicle, &mut MapJob) -> Option<String>;
 
 /// Does something else when a download was rejected as a duplicate; gives the actionId of the next step.
 fn on_duplicate(does: AfterDuplicate) -> Box<dyn Deviation> {
-    struct OnDuplicate(AfterDuplicate);
-    impl Deviation for OnDuplicate {
-        fn happens(&mut self, site: &mut Site, vehicle: &mut Vehicle, event: &mut Event<'_>) {
-            if let Event::RolledOut(job, false, next, done) = event
-                && job.stage == Stage::Download
-                && is_duplicate(vehicle, job)
-            {
-                **next = self.0(site, vehicle, job);
-                **done = true;
-            }
+    holding(does).happens(|does, site, vehicle, event| {
+        if let Event::RolledOut(job, false, next, done) = event
+            && job.stage == Stage::Download
+            && is_duplicate(vehicle, job)
+        {
+            **next = does(site, vehicle, job);
+            **done = true;
         }
-    }
-    Box::new(OnDuplicate(does))
+    })
 }
 
 fn download_again(site: &mut Site, vehicle: &mut Vehicle, job: &mut MapJob) -> Option<String> {

@@ -24,12 +24,12 @@ mod curves;
 mod dispatch;
 mod form;
 mod header;
-mod hooks;
 mod instants;
 mod limits;
 mod maps;
 mod options;
 mod orders;
+mod prelude;
 mod presence;
 mod reading;
 mod sending;
@@ -43,12 +43,10 @@ use std::sync::LazyLock;
 
 use serde_json::Value;
 
-use super::record::{Kind, Record};
-use crate::Fault;
-use crate::deviations::agv::Tolerance;
-use crate::master_control::seam::Deviation;
-use crate::master_control::vehicle::Vehicle;
-use crate::master_control::{MasterControl, MasterControlConfig, Site};
+use super::record::Records;
+use crate::master_control::hooks::Deviation;
+use crate::master_control::{MasterControl, MasterControlConfig};
+use crate::{Fault, Tolerance};
 
 /// A name that is not that of a deviation.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -61,82 +59,51 @@ pub struct Unknown {
 }
 
 /// All records.
-fn records() -> impl Iterator<Item = &'static Record<dyn Deviation>> {
-    let topics = [
-        transport::RECORDS,
-        header::RECORDS,
-        form::RECORDS,
-        orders::RECORDS,
-        curves::RECORDS,
-        options::RECORDS,
-        limits::RECORDS,
-        starts::RECORDS,
-        dispatch::RECORDS,
-        base::RECORDS,
-        updates::RECORDS,
-        sending::RECORDS,
-        cancellation::RECORDS,
-        actions::RECORDS,
-        instants::RECORDS,
-        maps::RECORDS,
-        presence::RECORDS,
-        reading::RECORDS,
-    ];
-    topics.into_iter().flatten()
-}
-
-fn find(name: &str) -> Option<&'static Record<dyn Deviation>> {
-    records().find(|record| record.name == name)
-}
-
-fn fault(record: &Record<dyn Deviation>) -> Fault {
-    Fault {
-        name: record.name,
-        breaks: record.requirements,
-        wrong: record.does,
-    }
-}
+const RECORDS: Records<dyn Deviation> = Records(&[
+    transport::RECORDS,
+    header::RECORDS,
+    form::RECORDS,
+    orders::RECORDS,
+    curves::RECORDS,
+    options::RECORDS,
+    limits::RECORDS,
+    starts::RECORDS,
+    dispatch::RECORDS,
+    base::RECORDS,
+    updates::RECORDS,
+    sending::RECORDS,
+    cancellation::RECORDS,
+    actions::RECORDS,
+    instants::RECORDS,
+    maps::RECORDS,
+    presence::RECORDS,
+    reading::RECORDS,
+]);
 
 /// Its faults and lapses.
-pub static FAULTS: LazyLock<Vec<Fault>> = LazyLock::new(|| {
-    let faults = records().filter(|record| record.is_fault());
-    faults.map(fault).collect()
-});
+pub static FAULTS: LazyLock<Vec<Fault>> = LazyLock::new(|| RECORDS.faults());
 
-/// The liberties it can take.
-pub static TOLERANCES: LazyLock<Vec<Tolerance>> = LazyLock::new(|| {
-    let liberties = records().filter(|record| record.is_liberty());
-    let liberties = liberties.map(|record| Tolerance {
-        name: record.name,
-        under: record.requirements,
-        does: record.does,
-    });
-    liberties.collect()
-});
+/// Its tolerances.
+pub static TOLERANCES: LazyLock<Vec<Tolerance>> = LazyLock::new(|| RECORDS.tolerances());
 
-/// Why a fault ends in less than a failure.
+/// The reason why a fault ends in less than a failure.
 #[must_use]
 pub fn lapse(name: &str) -> Option<&'static str> {
-    match find(name)?.kind {
-        Kind::Lapse(why) => Some(why),
-        _ => None,
-    }
+    RECORDS.lapse(name)
 }
 
-/// Lets a configuration take a liberty, and adds its name to those it takes.
+/// Prepares a configuration for a tolerance, and adds its name to those that are to be switched on.
 ///
 /// # Errors
 /// When there is none of that name.
 pub fn tolerate(
     config: &mut MasterControlConfig,
-    liberties: &mut Vec<&'static str>,
+    tolerances: &mut Vec<&'static str>,
     name: &str,
 ) -> Result<(), Unknown> {
-    let Some(record) = find(name).filter(|record| record.is_liberty()) else {
-        return Err(unknown("tolerance", name));
-    };
+    let record = RECORDS.tolerance(name).ok_or_else(|| unknown("tolerance", name))?;
     (record.make)().configures(config);
-    liberties.push(record.name);
+    tolerances.push(record.name);
     Ok(())
 }
 
@@ -145,43 +112,35 @@ fn unknown(kind: &'static str, name: &str) -> Unknown {
     Unknown { kind, name }
 }
 
-/// A reference master control with these faults and liberties, by name; without any it keeps to the standard.
+/// A reference master control with these faults and tolerances, by name; without any it keeps to the standard.
 ///
 /// # Errors
 /// When there is none of a name.
-pub fn built(config: MasterControlConfig, liberties: &[&str], faults: &[&str]) -> Result<MasterControl, Unknown> {
-    let mut deviations: Vec<Box<dyn Deviation>> = vec![Box::new(Configurable)];
+pub fn built(config: MasterControlConfig, tolerances: &[&str], faults: &[&str]) -> Result<MasterControl, Unknown> {
+    let mut deviations = vec![configurable()];
     for name in faults {
-        let record = find(name).filter(|record| record.is_fault());
-        deviations.push((record.ok_or_else(|| unknown("fault", name))?.make)());
+        deviations.push((RECORDS.fault(name).ok_or_else(|| unknown("fault", name))?.make)());
     }
-    for name in liberties {
-        let record = find(name).filter(|record| record.is_liberty());
-        deviations.push((record.ok_or_else(|| unknown("tolerance", name))?.make)());
+    for name in tolerances {
+        deviations.push((RECORDS
+            .tolerance(name)
+            .ok_or_else(|| unknown("tolerance", name))?
+            .make)());
     }
     Ok(MasterControl::with(config, deviations))
 }
 
-/// Takes liberties while it runs, when somebody asks for that: `configure` with the name of one as `what`.
-struct Configurable;
-
-impl Deviation for Configurable {
-    fn asked(
-        &mut self,
-        site: &mut Site,
-        _: &mut [Vehicle],
-        _: Option<usize>,
-        command: &str,
-        arguments: &Value,
-    ) -> bool {
+/// Switches tolerances on while it runs, when somebody asks for that: `configure` with the name of one as `what`.
+fn configurable() -> Box<dyn Deviation> {
+    prelude::plain().commanded(|(), site, _, command, arguments| {
         if command != "configure" {
             return true;
         }
         // What it has no setting for leaves it as it is.
         let what = arguments.get("what").and_then(Value::as_str).unwrap_or_default();
-        if let Some(record) = find(what).filter(|record| record.is_liberty()) {
+        if let Some(record) = RECORDS.tolerance(what) {
             site.switch_on((record.make)());
         }
         false
-    }
+    })
 }

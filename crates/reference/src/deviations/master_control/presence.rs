@@ -1,76 +1,56 @@
 //! Deviations of how it heeds connection and operating mode of a vehicle, and of what it keeps over a lost link (sections
 //! 6.11 and 6.14).
 
-use super::hooks::{has_low_battery, hasty, keep, mode, plain, takes_orders};
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use crate::master_control::Site;
 use crate::master_control::driving::{again, progress};
-use crate::master_control::seam::{Deviation, Event, Fate, Heard, Occasion, Permission};
-use crate::master_control::vehicle::{Presence, Running, Vehicle};
-use serde_json::{Value, json};
-use std::time::Duration;
+
+use super::prelude::*;
 
 records! {
     fault "orders-to-offline" ["CONN-12"] "Sends orders to vehicles that are offline."
         because "No sentence forbids an order for a vehicle that is lost; the ruling of CONN-12 is a warning."
-        => plain().allows(|(), _, vehicle, what, usual| usual || (matches!(what, Permission::Reach) && vehicle.state.is_some()));
+        => letting(|_, vehicle, what| matches!(what, Permission::Reach) && vehicle.state.is_some());
     fault "orders-in-manual" ["MODE-04"] "Sends orders to vehicles in MANUAL, SERVICE and TEACHIN."
-        => plain().allows(|(), _, vehicle, what, usual| match what {
+        => allowing(|vehicle, what, usual| match what {
             Permission::Command => true,
             Permission::Fit => usual || !takes_orders(vehicle),
             _ => usual,
         });
     fault "teachin-is-automatic" ["MODE-04"] "It commands a vehicle in TEACHIN as if it were in AUTOMATIC."
-        => plain().allows(|(), _, vehicle, what, usual| usual || (matches!(what, Permission::Command) && mode(vehicle) == "TEACHIN"));
+        => letting(|_, vehicle, what| matches!(what, Permission::Command) && mode(vehicle) == "TEACHIN");
     fault "actions-in-service" ["MODE-04"] "Sends instant actions to vehicles in SERVICE and TEACHIN."
-        => plain().allows(|(), site, vehicle, what, usual| {
-            usual || (matches!(what, Permission::Tell(_)) && matches!(mode(vehicle), "SERVICE" | "TEACHIN") && site.reachable(vehicle))
-        });
+        => letting(|site, vehicle, what| matches!(what, Permission::Tell(_)) && matches!(mode(vehicle), "SERVICE" | "TEACHIN") && site.reachable(vehicle));
     fault "cancel-in-manual" ["MODE-04"] "It sends cancelOrder, and what else waits, to a vehicle in a manual mode."
-        => plain().allows(|(), site, vehicle, what, usual| {
+        => letting(|site, vehicle, what| {
             let cancels = vehicle.instants.iter().any(|instant| instant.sent_at.is_none() && instant.kind() == "cancelOrder");
-            usual || (matches!(what, Permission::Tell(_)) && cancels && site.reachable(vehicle))
+            matches!(what, Permission::Tell(_)) && cancels && site.reachable(vehicle)
         });
     fault "pauses-in-every-mode" ["MODE-04"] "It sends startPause and stopPause also to a vehicle in MANUAL, SERVICE or TEACHIN."
-        => plain().allows(|(), site, vehicle, what, usual| {
-            usual || (matches!(what, Permission::Tell("startPause" | "stopPause")) && site.reachable(vehicle))
-        });
+        => letting(|site, vehicle, what| matches!(what, Permission::Tell("startPause" | "stopPause")) && site.reachable(vehicle));
     fault "map-actions-in-every-mode" ["MODE-04"] "It sends downloadMap, enableMap and deleteMap whatever the operating mode of the vehicle."
-        => plain().allows(|(), site, vehicle, what, usual| {
-            usual || (matches!(what, Permission::Tell("downloadMap" | "enableMap" | "deleteMap")) && site.reachable(vehicle))
-        });
+        => letting(|site, vehicle, what| matches!(what, Permission::Tell("downloadMap" | "enableMap" | "deleteMap")) && site.reachable(vehicle));
     fault "updates-in-service" ["MODE-04"] "Extends the order of a vehicle that keeps it in SERVICE or TEACHIN."
-        => plain().allows(|(), site, vehicle, what, usual| {
-            usual || (matches!(what, Permission::Follow) && vehicle.cancel.is_none() && site.reachable(vehicle))
-        });
+        => letting(|site, vehicle, what| matches!(what, Permission::Follow) && vehicle.cancel.is_none() && site.reachable(vehicle));
     fault "updates-in-manual" ["MODE-04"] "It goes on extending the base of a running order while the vehicle is in MANUAL."
         => plain().allows(|(), site, vehicle, what, usual| {
             let follows = matches!(what, Permission::Follow) && vehicle.cancel.is_none();
             usual || (follows && mode(vehicle) == "MANUAL" && site.reachable(vehicle))
-        }).happens(|(), _, vehicle, event| if let Event::State(_) = event && let Some(running) = &mut vehicle.running {
-            running.cleared = false;
-        });
+        }).happens(|(), _, vehicle, event| if let Event::State(_) = event && let Some(running) = &mut vehicle.running { running.cleared = false; });
     fault "updates-to-a-lost-vehicle" ["CONN-12"] "It keeps new orders back from a vehicle with CONNECTIONBROKEN, but goes on to send updates of the running one."
         because "CONN-12 recommends to look at the connection topic; no sentence forbids an update to a vehicle that is away."
-        => plain().allows(|(), _, vehicle, what, usual| {
+        => letting(|_, vehicle, what| {
             let lost = vehicle.presence == Presence::Away && takes_orders(vehicle);
-            usual || (matches!(what, Permission::Follow) && vehicle.cancel.is_none() && lost)
+            matches!(what, Permission::Follow) && vehicle.cancel.is_none() && lost
         });
     fault "queued-update-in-service" ["MODE-04"] "Looks at the mode when it plans an update, not when minOrderInterval lets it out."
         => keep::<bool>().happens(|held, _, _, event| match event {
             Event::Waits(..) => *held = true,
             Event::Updated(..) => *held = false,
             _ => {}
-        }).allows(|held, site, vehicle, what, usual| {
-            usual || (matches!(what, Permission::Follow) && *held && vehicle.cancel.is_none() && site.reachable(vehicle))
-        });
+        }).allows(|held, site, vehicle, what, usual| usual || (matches!(what, Permission::Follow) && *held && vehicle.cancel.is_none() && site.reachable(vehicle)));
     fault "cleared-order-updated" ["ORD-MSG-02"] "Goes on with the order a vehicle has given up in MANUAL."
         because "That a cleared order gets no update is read out of the text."
-        => plain().judges(|(), _, _, running, state, fate| {
-            if fate != Fate::Again || !running.accepted || state.order_id != running.id {
-                return fate;
-            }
+        => judging(|_, running, state, fate| {
+            if fate != Fate::Again || !running.accepted || state.order_id != running.id { return fate; }
             match progress(running, state) {
                 Fate::Again if running.confirmed => {
                     running.changed = true;
@@ -80,7 +60,7 @@ records! {
             }
         });
     fault "cancel-on-entering-manual" ["MODE-04"] "It sends cancelOrder when a vehicle with an order switches to MANUAL."
-        => plain().happens(|(), site, vehicle, event| if let Event::State(Some(before)) = event {
+        => happening(|site, vehicle, event| if let Event::State(Some(before)) = event {
             let seized = before.takes_orders() && mode(vehicle) == "MANUAL";
             let driven = vehicle.running.as_ref().is_some_and(|running| running.accepted);
             if seized && driven && site.reachable(vehicle) {
@@ -89,13 +69,9 @@ records! {
             }
         });
     fault "resend-in-service" ["MODE-04"] "It sends an order that was lost again although the vehicle is in SERVICE by now."
-        => plain().happens(|(), site, vehicle, event| if let Event::Looked = event && mode(vehicle) == "SERVICE" {
-            send_lost(site, vehicle);
-        });
+        => looked(|site, vehicle| if mode(vehicle) == "SERVICE" { send_lost(site, vehicle); });
     fault "copies-in-manual" ["MODE-04"] "It sends an order again, which the vehicle has not taken over, though the vehicle has meanwhile changed to MANUAL."
-        => plain().happens(|(), site, vehicle, event| if let Event::Looked = event && mode(vehicle) == "MANUAL" {
-            send_lost(site, vehicle);
-        });
+        => looked(|site, vehicle| if mode(vehicle) == "MANUAL" { send_lost(site, vehicle); });
     fault "charging-in-every-mode" ["MODE-04"] "Sends a vehicle whose battery is low to charge, whatever its mode."
         => keep::<bool>().happens(|charged, site, vehicle, event| if let Event::State(_) = event {
             let low = has_low_battery(site, vehicle);
@@ -111,9 +87,7 @@ records! {
         => keep::<String>().hears(|last, _, _, heard| {
             let stamp = stamp(heard);
             let old = heard.name == "connection" && stamp < *last;
-            if heard.name == "connection" && !old {
-                *last = stamp;
-            }
+            if heard.name == "connection" && !old { *last = stamp; }
             !old
         });
     fault "old-will-not-heeded" ["CONN-13", "CONN-12"] "It ignores a connection message whose headerId is lower than that of the one before."
@@ -121,9 +95,7 @@ records! {
         => keep::<Option<u64>>().hears(|last, _, _, heard| {
             let count = heard.message["headerId"].as_u64().filter(|_| heard.name == "connection");
             let low = count.zip(*last).is_some_and(|(new, last)| new < last);
-            if !low {
-                *last = count.or(*last);
-            }
+            if !low { *last = count.or(*last); }
             !low
         });
     fault "will-older-than-state-ignored" ["CONN-13"] "It ignores CONNECTIONBROKEN whose timestamp is older than that of the last state."
@@ -131,9 +103,7 @@ records! {
         => keep::<String>().hears(|last, _, _, heard| {
             let stamp = stamp(heard);
             let old = is_broken(heard) && stamp < *last;
-            if heard.name == "state" {
-                *last = stamp;
-            }
+            if heard.name == "state" { *last = stamp; }
             !old
         });
     fault "will-with-low-header-id-ignored" ["CONN-13", "CONN-12"] "It ignores a CONNECTIONBROKEN whose headerId is not above that of the connection message before."
@@ -141,27 +111,25 @@ records! {
         => keep::<u64>().hears(|last, _, _, heard| {
             let count = heard.message["headerId"].as_u64().filter(|_| heard.name == "connection");
             let low = is_broken(heard) && count.is_some_and(|count| count <= *last);
-            if !low {
-                *last = count.unwrap_or(*last);
-            }
+            if !low { *last = count.unwrap_or(*last); }
             !low
         });
     fault "broken-heeded-only-at-rest" ["CONN-12"] "It ignores CONNECTIONBROKEN while the vehicle has an order."
         because "CONN-12 recommends to notice a lost vehicle; no sentence forbids what is sent to one that has an order."
-        => plain().hears(|(), _, vehicle, heard| !is_broken(heard) || vehicle.running.is_none());
+        => hearing(|_, vehicle, heard| !is_broken(heard) || vehicle.running.is_none());
     fault "will-older-than-minute-ignored" ["CONN-13", "CONN-12"] "It ignores CONNECTIONBROKEN with a timestamp older than a minute."
         because "CONN-13 describes that last wills may be minutes old, and recommends to bear it."
-        => plain().hears(|(), site, _, heard| {
+        => hearing(|site, _, heard| {
             let told = stamp(heard).parse::<jiff::Timestamp>();
             let age = told.map_or(0, |told| site.now.utc.as_second() - told.as_second());
             !is_broken(heard) || age <= 60
         });
     fault "broken-not-heeded" ["CONN-12"] "It takes no notice of CONNECTIONBROKEN and commands the vehicle on; only OFFLINE counts."
         because "CONN-12 recommends to notice a lost vehicle; no sentence forbids orders to one with CONNECTIONBROKEN."
-        => plain().hears(|(), _, _, heard| !is_broken(heard));
+        => hearing(|_, _, heard| !is_broken(heard));
     fault "offline-vehicle-gets-orders" ["CONN-12"] "It takes only CONNECTIONBROKEN for a lost connection and dispatches to a vehicle that is OFFLINE."
         because "CONN-12 recommends to notice that a vehicle has gone; no sentence forbids orders to one that is OFFLINE."
-        => plain().hears(|(), _, _, heard| heard.name != "connection" || heard.message["connectionState"] != "OFFLINE");
+        => hearing(|_, _, heard| heard.name != "connection" || heard.message["connectionState"] != "OFFLINE");
     fault "online-is-healthy" ["CONN-14"] "Takes a vehicle that comes ONLINE for healthy, whatever its errors."
         => keep::<bool>().happens(|absolved, site, vehicle, event| match event {
             Event::Online(before) if *before != Presence::Online => *absolved = true,
@@ -174,9 +142,7 @@ records! {
             vehicle.cancel = None;
         }).allows(|(), _, _, what, usual| usual || matches!(what, Permission::Interrupt));
     fault "publishes-connection" ["TOPIC-15"] "Sets the connection of a vehicle it has lost to OFFLINE by itself."
-        => plain().happens(|(), site, vehicle, event| if let Event::Away(true, _) = event {
-            say_connection(site, vehicle, "OFFLINE");
-        });
+        => happening(|site, vehicle, event| if let Event::Away(true, _) = event { say_connection(site, vehicle, "OFFLINE"); });
     fault "publishes-connection-for-silent-vehicle" ["TOPIC-15"]
         "It publishes CONNECTIONBROKEN on the vehicle's connection topic itself when no state came for a while."
         => keep::<bool>().happens(|said, site, vehicle, event| match event {
@@ -194,22 +160,14 @@ records! {
         });
     fault "clears-the-will" ["TOPIC-15"]
         "It removes the retained CONNECTIONBROKEN of a vehicle by publishing an empty retained message on the connection topic of the vehicle."
-        => plain().happens(|(), site, vehicle, event| if let Event::Away(true, _) = event {
-            clear_connection(site, vehicle);
-        });
+        => happening(|site, vehicle, event| if let Event::Away(true, _) = event { clear_connection(site, vehicle); });
     fault "connection-topic-cleared" ["TOPIC-15"] "It clears the retained message on the connection topic of a vehicle that went away, with an empty retained message."
-        => plain().happens(|(), site, vehicle, event| if let Event::Away(_, Presence::Online) = event {
-            clear_connection(site, vehicle);
-        });
+        => happening(|site, vehicle, event| if let Event::Away(_, Presence::Online) = event { clear_connection(site, vehicle); });
     fault "twice-broken-is-defective" ["CONN-14", "MQTT-10"] "It takes a vehicle whose connection broke twice for defective and gives it no order any more."
-        => keep::<u32>().happens(|times, _, _, event| if let Event::Away(true, _) = event {
-            *times += 1;
-        }).allows(|times, _, _, what, usual| usual && !(*times > 1 && matches!(what, Permission::Begin)));
+        => keep::<u32>().happens(|times, _, _, event| if let Event::Away(true, _) = event { *times += 1; }).allows(|times, _, _, what, usual| usual && !(*times > 1 && matches!(what, Permission::Begin)));
     fault "state-means-online" ["CONN-12"] "It takes a vehicle for connected as soon as a state comes, although the connection topic says it is gone."
         because "A state comes from a vehicle that is there; CONN-12 only recommends to go by the connection topic."
-        => plain().happens(|(), _, vehicle, event| if let Event::State(_) = event && vehicle.presence == Presence::Away {
-            vehicle.presence = Presence::Online;
-        });
+        => state_taken(|_, vehicle| if vehicle.presence == Presence::Away { vehicle.presence = Presence::Online; });
     fault "broken-means-cancel" ["CONN-14"] "It takes CONNECTIONBROKEN for a failure of the vehicle and calls the running order off when it is back."
         => keep::<bool>().happens(|due, site, vehicle, event| match event {
             Event::Away(broken, _) => *due |= *broken && vehicle.running.is_some(),
@@ -217,9 +175,7 @@ records! {
             _ => {}
         });
     fault "online-clears-errors" ["CONN-14"] "With ONLINE it takes the errors of the last state for gone and sends orders in spite of a FATAL error."
-        => plain().happens(|(), _, vehicle, event| if let Event::Online(_) = event && let Some(state) = &mut vehicle.state {
-            state.errors.clear();
-        });
+        => happening(|_, vehicle, event| if let Event::Online(_) = event && let Some(state) = &mut vehicle.state { state.errors.clear(); });
     fault "block-forgotten-on-return" ["ORD-12"] "Forgets which edges a vehicle may not use when that vehicle comes back."
         => on_return(|_, vehicle| vehicle.blocked.clear());
     fault "cancel-forgotten-on-return" ["ORD-CANCEL-01"] "Forgets that it has called an order off when the vehicle comes back, and goes on with it."
@@ -241,9 +197,7 @@ records! {
             Event::Online(Presence::Away) => *back = vehicle.running.is_some(),
             Event::Begun | Event::Updated(..) => *back = false,
             _ => {}
-        }).window(|back, _, _, _, window, _| if *back {
-            window.first = 0;
-        });
+        }).shows(|back, _, _, _, window, _| if *back { window.first = 0; });
     fault "whole-order-again-after-reconnect" ["ORD-UPD-05", "ORD-UPD-03"]
         "It sends the whole order from its first node on as an update, with the next orderUpdateId, when a vehicle with a running order comes ONLINE again."
         => keep::<bool>().happens(|back, _, vehicle, event| match event {
@@ -255,27 +209,25 @@ records! {
             }
             Event::Begun | Event::Updated(..) => *back = false,
             _ => {}
-        }).window(|back, _, _, _, window, _| if *back {
-            window.first = 0;
-        });
+        }).shows(|back, _, _, _, window, _| if *back { window.first = 0; });
     fault "reconnect-forgets-order" ["MQTT-10", "ORD-UPD-02", "STATE-17"]
         "After its own connection was lost and came back it has forgotten the running orders and never extends their base again."
         because "MQTT-10 describes that links fail, and demands no memory of a master control whose own link failed."
-        => on_reconnect(|_, vehicle| {
+        => reconnected(|_, vehicle| {
             vehicle.running = None;
             vehicle.cancel = None;
         });
     fault "instants-forgotten-on-reconnect" ["MQTT-10", "ORD-CANCEL-01"]
         "It forgets the instant actions that wait or were not seen yet, cancelOrder among them, when its connection comes back."
-        => on_reconnect(|_, vehicle| vehicle.instants.clear());
+        => reconnected(|_, vehicle| vehicle.instants.clear());
     fault "block-forgotten-on-reconnect" ["ORD-12"] "After its own connection was lost and came back it has forgotten which edges a vehicle may not use."
-        => on_reconnect(|_, vehicle| vehicle.blocked.clear());
+        => reconnected(|_, vehicle| vehicle.blocked.clear());
     fault "interval-forgotten-on-reconnect" ["FACT-13"]
         "After its own connection was lost and came back the next order message is sent without regard to minOrderInterval."
-        => on_reconnect(|_, vehicle| vehicle.last_order_at = None);
+        => reconnected(|_, vehicle| vehicle.last_order_at = None);
     fault "update-ids-restart-on-reconnect" ["ORD-UPD-04"]
         "After its own connection was lost and came back it counts the orderUpdateId of a running order from 1 again."
-        => on_reconnect(|_, vehicle| restart_update_ids(vehicle));
+        => reconnected(|_, vehicle| restart_update_ids(vehicle));
     fault "new-order-on-reconnect" ["ORD-CANCEL-01", "MQTT-10"]
         "It sends the running transport as a new order with another orderId, without cancelOrder, when its own connection comes back."
         because "That the transport is the same cannot be seen; the vehicle refuses the other orderId, and ORD-CANCEL-01 is warned of."
@@ -296,39 +248,33 @@ records! {
         => keep::<bool>().happens(while_driven).allows(|lost, _, _, what, usual| usual && !(*lost && matches!(what, Permission::Supervise(_))));
     fault "never-reconnects" ["MQTT-10"] "Does not connect again after a broken link."
         because "MQTT-10 is a recommendation and never more than a warning."
-        => plain().retries(|_, _| None);
+        => plain().retries(|(), _, _| None);
     fault "reconnects-only-once" ["MQTT-10"] "It connects again after the first lost connection, but not after the second one."
         because "MQTT-10 is a recommendation and never more than a warning."
-        => plain().retries(|site, retry| retry.filter(|_| site.connection.losses < 2));
-    liberty "reconnects-later" ["MQTT-10"] "It waits four times as long before it connects again."
-        => plain().retries(|_, retry| retry.map(|delay| delay * 4));
-    liberty "state-asked-after-reconnect" ["MQTT-10", "ACT-08"] "After its own connection was lost and came back it sends stateRequest."
-        => on_reconnect(|site, vehicle| if vehicle.state.is_some() {
-            site.instant(vehicle, "stateRequest", &Value::Null);
-        });
-    liberty "factsheet-asked-on-return" ["ACT-08", "TOPIC-14"] "It sends a factsheetRequest when a vehicle comes ONLINE again."
-        => plain().happens(|(), site, vehicle, event| if let Event::Online(Presence::Away) = event {
-            ask_factsheet(site, vehicle);
-        });
-    liberty "factsheet-request-at-each-online" ["IACT-02", "ORD-MSG-17"] "It requests the factsheet each time that a vehicle comes ONLINE."
+        => plain().retries(|(), site, retry| retry.filter(|_| site.connection.losses < 2));
+    tolerance "reconnects-later" ["MQTT-10"] "It waits four times as long before it connects again."
+        => plain().retries(|(), _, retry| retry.map(|delay| delay * 4));
+    tolerance "state-asked-after-reconnect" ["MQTT-10", "ACT-08"] "After its own connection was lost and came back it sends stateRequest."
+        => reconnected(|site, vehicle| if vehicle.state.is_some() { site.instant(vehicle, "stateRequest", &Value::Null); });
+    tolerance "factsheet-asked-on-return" ["ACT-08", "TOPIC-14"] "It sends a factsheetRequest when a vehicle comes ONLINE again."
+        => happening(|site, vehicle, event| if let Event::Online(Presence::Away) = event { ask_factsheet(site, vehicle); });
+    tolerance "factsheet-request-at-each-online" ["IACT-02", "ORD-MSG-17"] "It requests the factsheet each time that a vehicle comes ONLINE."
         => on_return(ask_factsheet);
-    liberty "state-request-after-online" ["TOPIC-13", "IACT-01"] "It asks for a state by stateRequest whenever a vehicle comes ONLINE."
-        => on_return(|site, vehicle| {
-            site.instant(vehicle, "stateRequest", &Value::Null);
-        });
-    liberty "requests-state-and-factsheet-when-online" ["IACT-01", "TOPIC-13"]
+    tolerance "state-request-after-online" ["TOPIC-13", "IACT-01"] "It asks for a state by stateRequest whenever a vehicle comes ONLINE."
+        => on_return(|site, vehicle| { site.instant(vehicle, "stateRequest", &Value::Null); });
+    tolerance "requests-state-and-factsheet-when-online" ["IACT-01", "TOPIC-13"]
         "It sends stateRequest and factsheetRequest in one message each time a vehicle reports ONLINE."
         => on_return(|site, vehicle| {
             site.instant(vehicle, "stateRequest", &Value::Null);
             ask_factsheet(site, vehicle);
         });
-    liberty "fresh-state-awaited" ["CONN-12"] "It begins no order for a vehicle that came back before a new state has come from it."
+    tolerance "fresh-state-awaited" ["CONN-12"] "It begins no order for a vehicle that came back before a new state has come from it."
         => keep::<bool>().happens(|stale, _, _, event| match event {
             Event::Online(Presence::Away) => *stale = true,
             Event::State(_) => *stale = false,
             _ => {}
         }).allows(|stale, _, _, what, usual| usual && !(*stale && matches!(what, Permission::Begin)));
-    liberty "repeats-order-after-online" ["ORD-REJ-18", "ORD-UPD-04", "ORD-UPD-05"]
+    tolerance "repeats-order-after-online" ["ORD-REJ-18", "ORD-UPD-04", "ORD-UPD-05"]
         "It repeats the last order message with the same content when the vehicle comes ONLINE again."
         => keep::<bool>().happens(|due, site, vehicle, event| match event {
             Event::Online(Presence::Away) => *due = vehicle.running.is_some(),
@@ -349,7 +295,7 @@ records! {
             }
             _ => {}
         });
-    liberty "stops-pause-after-reconnect-only-by-operator" ["TOPIC-13", "IACT-02"] "It sends nothing to a vehicle that came back paused until the operator resumes it."
+    tolerance "stops-pause-after-reconnect-only-by-operator" ["TOPIC-13", "IACT-02"] "It sends nothing to a vehicle that came back paused until the operator resumes it."
         => keep::<bool>().happens(|back, _, vehicle, event| match event {
             Event::Online(Presence::Away) => *back = true,
             Event::State(_) => *back &= vehicle.is_paused(),
@@ -358,12 +304,12 @@ records! {
             let concerned = matches!(what, Permission::Begin | Permission::Extend(_) | Permission::Resend(_));
             usual && !(*back && concerned && vehicle.is_paused())
         });
-    liberty "orders-to-faulted" ["CONN-14"] "Begins what it is asked for on a vehicle with a FATAL error."
-        => plain().allows(|(), _, _, what, usual| usual || matches!(what, Permission::Fit));
-    liberty "no-orders-on-low-battery" ["TOPIC-13"] "It gives no new transport to a vehicle whose batteryCharge is below 30 percent and that is not charging."
+    tolerance "orders-to-faulted" ["CONN-14"] "Begins what it is asked for on a vehicle with a FATAL error."
+        => letting(|_, _, what| matches!(what, Permission::Fit));
+    tolerance "no-orders-on-low-battery" ["TOPIC-13"] "It gives no new transport to a vehicle whose batteryCharge is below 30 percent and that is not charging."
         => plain().configures(|config| config.low_battery = 30.0);
-    liberty "no-new-orders-in-semiautomatic" ["MODE-04"] "It begins new orders in AUTOMATIC only, and lets running ones go on in SEMIAUTOMATIC."
-        => plain().allows(|(), _, vehicle, what, usual| usual && !(matches!(what, Permission::Begin) && mode(vehicle) == "SEMIAUTOMATIC"));
+    tolerance "no-new-orders-in-semiautomatic" ["MODE-04"] "It begins new orders in AUTOMATIC only, and lets running ones go on in SEMIAUTOMATIC."
+        => forbidding(|_, vehicle, what| matches!(what, Permission::Begin) && mode(vehicle) == "SEMIAUTOMATIC");
 }
 
 fn stamp(heard: &Heard<'_>) -> String {
@@ -414,25 +360,12 @@ fn clear_connection(site: &mut Site, vehicle: &Vehicle) {
     }
 }
 
-/// Does something when a vehicle comes ONLINE, or when the broker is back.
-struct Back(bool, fn(&mut Site, &mut Vehicle));
-
-fn on_return(does: fn(&mut Site, &mut Vehicle)) -> Box<Back> {
-    Box::new(Back(false, does))
-}
-
-fn on_reconnect(does: fn(&mut Site, &mut Vehicle)) -> Box<Back> {
-    Box::new(Back(true, does))
-}
-
-impl Deviation for Back {
-    fn happens(&mut self, site: &mut Site, vehicle: &mut Vehicle, event: &mut Event<'_>) {
-        match event {
-            Event::Online(before) if !self.0 && *before != Presence::Online => self.1(site, vehicle),
-            Event::Connected(true) if self.0 => self.1(site, vehicle),
-            _ => {}
-        }
-    }
+/// Does something when a vehicle comes ONLINE.
+fn on_return(then: fn(&mut Site, &mut Vehicle)) -> Box<dyn Deviation> {
+    when(
+        |event| matches!(event, Event::Online(before) if *before != Presence::Online),
+        then,
+    )
 }
 
 /// Remembers that the broker was away during the running order.

@@ -1,19 +1,9 @@
 //! Deviations of how it reads what vehicles say: what is odd but legal, what is for display only, what is old (sections
 //! 6.10, 6.12, 6.13 and 6.15).
 
-use super::hooks::{fleet, informs, is_unsure, keep, plain, temporary};
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use crate::master_control::Site;
 use crate::master_control::layout::distance;
-use crate::master_control::seam::{Deviation, Event, Heard, Permission};
-use crate::master_control::seen::{Factsheet, Position};
-use crate::master_control::vehicle::Vehicle;
-use crate::master_control::ways::Standing;
-use serde_json::{Value, json};
-use std::collections::BTreeMap;
-use std::time::Duration;
-use tck_base::clock::Moment;
+
+use super::prelude::*;
 
 records! {
     fault "empty-last-node-shunned" ["TOPIC-13"] "Serves a vehicle no more that once knew no last node."
@@ -45,9 +35,7 @@ records! {
         because "No sentence says within what time a vehicle is served."
         => shuns(|_, _, heard| heard.payload.is_empty());
     fault "minimal-factsheet-shunned" ["TOPIC-13"] "Serves a vehicle no more whose factsheet has left optional members out."
-        => shuns(|_, _, heard| {
-            heard.name == "factsheet" && heard.message.pointer("/protocolLimits/maxArrayLens/order.nodes").is_none()
-        });
+        => shuns(|_, _, heard| heard.name == "factsheet" && heard.message.pointer("/protocolLimits/maxArrayLens/order.nodes").is_none());
     fault "wrong-type-shunned" ["TOPIC-13"] "Serves a vehicle no more that has written a number as text."
         because "No sentence says within what time a vehicle is served."
         => shuns(|_, _, heard| heard.name == "state" && heard.message["orderUpdateId"].is_string());
@@ -60,20 +48,16 @@ records! {
         => dies(nowhere);
     fault "zero-is-a-limit" ["TOPIC-13"] "Takes a limit of 0 in a factsheet for one."
         because "No sentence says within what time a vehicle is served."
-        => plain().allows(|(), _, vehicle, what, usual| {
+        => forbidding(|_, vehicle, what| {
             let zero = vehicle.factsheet.as_ref().is_some_and(|sheet| sheet.has_zeros);
-            usual && !(zero && matches!(what, Permission::Name(_)))
+            zero && matches!(what, Permission::Name(_))
         });
     fault "version-of-the-vehicle" ["HDR-04"] "Copies the version of the last state into its own header."
         => keep::<Option<Value>>().hears(|version, _, _, heard| {
-            if heard.name == "state" {
-                *version = heard.message.get("version").cloned();
-            }
+            if heard.name == "state" { *version = heard.message.get("version").cloned(); }
             true
         }).sends(|version, _, _, out| {
-            if let Some(version) = version {
-                out.message.set("version", version.clone());
-            }
+            if let Some(version) = version { out.message.set("version", version.clone()); }
             true
         });
     fault "drops-states-with-low-header-id" ["MQTT-10", "ORD-UPD-02"]
@@ -82,9 +66,7 @@ records! {
         => keep::<Option<u64>>().hears(|last, _, _, heard| {
             let count = heard.message["headerId"].as_u64().filter(|_| heard.name == "state");
             let low = count.zip(*last).is_some_and(|(new, last)| new <= last);
-            if !low {
-                *last = count.or(*last);
-            }
+            if !low { *last = count.or(*last); }
             !low
         });
     fault "lost-state-stops-progress" ["MQTT-10", "ORD-UPD-02"] "It follows the vehicle node by node and sends no further base once the state of one node was lost."
@@ -102,9 +84,9 @@ records! {
         }).allows(|(_, skipped), _, _, what, usual| usual && !(*skipped && matches!(what, Permission::Extend(_))));
     fault "missing-paused-is-paused" ["ORD-UPD-02", "STATE-17"] "Takes a vehicle that does not say whether it is paused for paused."
         because "It breaks a recommendation only."
-        => plain().allows(|(), _, vehicle, what, usual| {
+        => forbidding(|_, vehicle, what| {
             let told = vehicle.state.as_ref().is_some_and(|state| state.paused.is_some());
-            usual && (told || !matches!(what, Permission::Extend(_)))
+            !told && matches!(what, Permission::Extend(_))
         });
     fault "visualization-obeyed" ["VIS-03"] "Takes the position of a vehicle from the visualization."
         => keep::<Option<(String, Value)>>().hears(|shown, site, vehicle, heard| {
@@ -128,9 +110,7 @@ records! {
             let told = vehicle.state.as_ref().and_then(|state| state.agv_position.as_ref());
             if let (Some(shown), Some(told)) = (shown(heard), told) {
                 let aside = distance((shown.x, shown.y), (told.x, told.y)) > 1.0;
-                if aside && !*before {
-                    site.instant(vehicle, "startPause", &Value::Null);
-                }
+                if aside && !*before { site.instant(vehicle, "startPause", &Value::Null); }
                 *before = aside;
             }
             true
@@ -149,7 +129,7 @@ records! {
         => keep::<Option<Position>>().hears(|seen, _, _, heard| {
             *seen = shown(heard).or(seen.take());
             true
-        }).pose(|seen, site, _, pose, _| {
+        }).stands(|seen, site, _, pose, _| {
             let near = seen.as_ref().and_then(|seen| site.config.nearest(seen.x, seen.y, &seen.map_id));
             if let Some((node, _)) = near {
                 pose.node.clone_from(&node.id);
@@ -159,71 +139,55 @@ records! {
     fault "temporary-start-from-visualization" ["VIS-03", "ORD-CANCEL-17"]
         "It puts the temporary node at which an order begins between two nodes where the visualization shows the vehicle, not where the state does."
         => keep::<Option<Position>>().hears(|seen, _, _, heard| {
-            if heard.name == "visualization" {
-                *seen = shown(heard);
-            }
+            if heard.name == "visualization" { *seen = shown(heard); }
             true
-        }).way(|seen, site, _, way, _, _| if let Some(seen) = seen && let Some(first) = temporary(site, way) {
-            (first.x, first.y) = (seen.x, seen.y);
-        });
+        }).plans(|seen, site, _, way, _, _| if let Some(seen) = seen && let Some(first) = temporary(site, way) { (first.x, first.y) = (seen.x, seen.y); });
     fault "information-obeyed" ["INFO-02"] "Pauses vehicles that report an information."
-        => plain().happens(|(), site, vehicle, event| if let Event::State(_) = event {
+        => state_taken(|site, vehicle| {
             let paused = vehicle.instants.iter().any(|instant| instant.kind() == "startPause");
-            if informs(vehicle) && !paused {
-                site.instant(vehicle, "startPause", &Value::Null);
-            }
+            if informs(vehicle) && !paused { site.instant(vehicle, "startPause", &Value::Null); }
         });
     fault "information-asks-for-state" ["INFO-02"] "It sends a stateRequest when a vehicle begins to give information entries."
         => keep::<bool>().happens(|before, site, vehicle, event| if let Event::State(_) = event {
-            if informs(vehicle) && !*before {
-                site.instant(vehicle, "stateRequest", &Value::Null);
-            }
+            if informs(vehicle) && !*before { site.instant(vehicle, "stateRequest", &Value::Null); }
             *before = informs(vehicle);
         });
     fault "information-cancels-order" ["INFO-02"] "It calls the running order off as soon as the state of the vehicle holds any information."
-        => plain().happens(|(), site, vehicle, event| if let Event::Looked = event && informs(vehicle) && vehicle.cancel.is_none() {
-            site.cancel(vehicle, None);
-        });
+        => looked(|site, vehicle| if informs(vehicle) && vehicle.cancel.is_none() { site.cancel(vehicle, None); });
     fault "information-holds-base" ["INFO-02", "ORD-UPD-02", "STATE-17"] "It does not extend the base while the state carries information."
-        => plain().allows(|(), _, vehicle, what, usual| usual && !(matches!(what, Permission::Extend(_)) && informs(vehicle)));
+        => forbidding(|_, vehicle, what| matches!(what, Permission::Extend(_)) && informs(vehicle));
     fault "information-holds-dispatch" ["INFO-02"] "It begins no new order while the state carries information."
-        => plain().allows(|(), _, vehicle, what, usual| usual && !(matches!(what, Permission::Begin) && informs(vehicle)));
+        => forbidding(|_, vehicle, what| matches!(what, Permission::Begin) && informs(vehicle));
     fault "information-blocks-dispatch" ["INFO-02"] "It dispatches no order to a vehicle that reports an information entry of level INFO."
-        => plain().allows(|(), _, vehicle, what, usual| {
+        => forbidding(|_, vehicle, what| {
             let mut told = vehicle.state.iter().flat_map(|state| &state.information).flatten();
-            usual && !(matches!(what, Permission::Begin) && told.any(|entry| entry["infoLevel"] == "INFO"))
+            matches!(what, Permission::Begin) && told.any(|entry| entry["infoLevel"] == "INFO")
         });
     fault "localization-obeyed" ["INFO-03"] "Gives no work to vehicles with a low localizationScore."
-        => plain().allows(|(), _, vehicle, what, usual| {
+        => forbidding(|_, vehicle, what| {
             let position = vehicle.state.as_ref().and_then(|state| state.agv_position.as_ref());
             let wide = position.and_then(|position| position.deviation_range).is_some_and(|range| range > 1.0);
-            usual && !(matches!(what, Permission::Begin | Permission::Extend(_)) && (wide || is_unsure(vehicle)))
+            matches!(what, Permission::Begin | Permission::Extend(_)) && (wide || is_unsure(vehicle))
         });
     fault "low-score-blocks-dispatch" ["INFO-03"] "It dispatches no order to a vehicle whose localizationScore is below one half."
-        => plain().allows(|(), _, vehicle, what, usual| usual && !(matches!(what, Permission::Begin) && is_unsure(vehicle)));
+        => forbidding(|_, vehicle, what| matches!(what, Permission::Begin) && is_unsure(vehicle));
     fault "low-score-starts-beside" ["INFO-03"] "It begins an order at a temporary node instead of the node the vehicle stands on when the localizationScore is low."
-        => plain().pose(|(), _, vehicle, pose, _| if is_unsure(vehicle) {
-            pose.standing = Standing::Between;
-        });
+        => standing(|_, vehicle, pose| if is_unsure(vehicle) { pose.standing = Standing::Between; });
     fault "low-score-relocated" ["INFO-03"] "It sends initPosition to an idle vehicle whose localizationScore is low."
         => keep::<bool>().happens(|before, site, vehicle, event| if let Event::State(_) = event {
             let low = is_unsure(vehicle);
-            if low && !*before && vehicle.running.is_none() {
-                site.init_position(vehicle, &Value::Null);
-            }
+            if low && !*before && vehicle.running.is_none() { site.init_position(vehicle, &Value::Null); }
             *before = low;
         });
     fault "deviation-range-at-start" ["INFO-03"] "It adds the reported deviationRange to the allowedDeviationXY of the first node of an order."
-        => plain().way(|(), _, vehicle, way, _, fresh| {
+        => planning_new(|_, vehicle, way| {
             let position = vehicle.state.as_ref().and_then(|state| state.agv_position.as_ref());
-            let range = position.and_then(|position| position.deviation_range).filter(|_| fresh);
-            if let Some(range) = range && let Some(first) = way.stops.first_mut() {
-                first.deviation_xy = Some(first.deviation_xy.unwrap_or(0.0) + range.abs());
-            }
+            let range = position.and_then(|position| position.deviation_range);
+            if let Some(range) = range && let Some(first) = way.stops.first_mut() { first.deviation_xy = Some(first.deviation_xy.unwrap_or(0.0) + range.abs()); }
         });
     fault "first-factsheet-forever" ["FACT-15", "FACT-12", "FACT-13", "OPT-03", "OPT-05"]
         "It goes by the first factsheet it got from a vehicle and ignores every later one."
-        => plain().hears(|(), _, vehicle, heard| heard.name != "factsheet" || vehicle.factsheet.is_none());
+        => hearing(|_, vehicle, heard| heard.name != "factsheet" || vehicle.factsheet.is_none());
     fault "factsheet-shared-by-fleet" ["OPT-03", "FACT-12", "FACT-15"] "It takes the factsheet heard last from any vehicle for the factsheet of all vehicles."
         => fleet::<Option<Factsheet>>().happens(|last, _, vehicle, event| match event {
             Event::Factsheet => last.clone_from(&vehicle.factsheet),
@@ -240,12 +204,10 @@ records! {
         });
     fault "factsheet-published-again" ["TOPIC-15"] "It publishes the first factsheet of a vehicle again on the factsheet topic, retained."
         => keep::<bool>().hears(|published, site, _, heard| {
-            if heard.name == "factsheet" && !std::mem::replace(published, true) {
-                site.push(heard.topic.to_owned(), heard.payload.to_vec(), 0, true);
-            }
+            if heard.name == "factsheet" && !std::mem::replace(published, true) { site.push(heard.topic.to_owned(), heard.payload.to_vec(), 0, true); }
             true
         });
-    liberty "state-asked-when-quiet" ["ACT-08"] "It sends stateRequest when no state has come for six seconds."
+    tolerance "state-asked-when-quiet" ["ACT-08"] "It sends stateRequest when no state has come for six seconds."
         => keep::<Option<Moment>>().happens(|asked, site, vehicle, event| if let Event::Looked = event && vehicle.state.is_some() && site.commandable(vehicle) {
             let due = vehicle.state_at + Duration::from_secs(6);
             if due > site.now.moment {
@@ -258,7 +220,7 @@ records! {
 }
 
 /// What it has heard of a vehicle.
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Past {
     /// headerId of the last state.
     header: Option<u64>,
@@ -269,54 +231,35 @@ struct Past {
 }
 
 /// Gives a vehicle no work any more that has sent something.
-struct Shuns(BTreeMap<String, Past>, fn(&Past, &Site, &Heard<'_>) -> bool);
-
-fn shuns(odd: fn(&Past, &Site, &Heard<'_>) -> bool) -> Box<Shuns> {
-    Box::new(Shuns(BTreeMap::new(), odd))
-}
-
-impl Deviation for Shuns {
-    fn hears(&mut self, site: &mut Site, vehicle: &mut Vehicle, heard: &mut Heard<'_>) -> bool {
-        let past = self.0.entry(vehicle.config.serial_number.clone()).or_default();
-        let state = heard.name == "state";
-        if state {
-            past.paused = if heard.message["paused"] == true {
-                past.paused + 1
-            } else {
-                0
-            };
-        }
-        past.shunned |= self.1(past, site, heard);
-        if state {
-            past.header = heard.message["headerId"].as_u64().or(past.header);
-        }
-        true
-    }
-
-    fn allows(&self, _: &Site, vehicle: &Vehicle, what: Permission<'_>, usual: bool) -> bool {
-        let shunned = self
-            .0
-            .get(&vehicle.config.serial_number)
-            .is_some_and(|past| past.shunned);
-        usual && !(shunned && matches!(what, Permission::Begin))
-    }
+fn shuns(odd: fn(&Past, &Site, &Heard<'_>) -> bool) -> Box<dyn Deviation> {
+    each((odd, Past::default()))
+        .hears(|(odd, past), site, _, heard| {
+            let state = heard.name == "state";
+            if state {
+                past.paused = if heard.message["paused"] == true {
+                    past.paused + 1
+                } else {
+                    0
+                };
+            }
+            past.shunned |= odd(past, site, heard);
+            if state {
+                past.header = heard.message["headerId"].as_u64().or(past.header);
+            }
+            true
+        })
+        .allows(|(_, past), _, _, what, usual| usual && !(past.shunned && matches!(what, Permission::Begin)))
 }
 
 /// Ends because of a message.
-struct Dies(fn(&Heard<'_>) -> bool);
-
-fn dies(of: fn(&Heard<'_>) -> bool) -> Box<Dies> {
-    Box::new(Dies(of))
-}
-
-impl Deviation for Dies {
-    fn hears(&mut self, site: &mut Site, _: &mut Vehicle, heard: &mut Heard<'_>) -> bool {
-        let dies = self.0(heard);
+fn dies(of: fn(&Heard<'_>) -> bool) -> Box<dyn Deviation> {
+    holding(of).hears(|of, site, _, heard| {
+        let dies = of(heard);
         if dies {
             site.shut_down();
         }
         !dies
-    }
+    })
 }
 
 fn nowhere(heard: &Heard<'_>) -> bool {

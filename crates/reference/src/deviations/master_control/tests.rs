@@ -262,9 +262,9 @@ fn no_fault_makes_it_flood_or_panic() {
 #[test]
 fn with_every_tolerance_transports_reach_their_end() {
     for tolerance in TOLERANCES.iter() {
-        let (mut config, mut liberties) = (config(), Vec::new());
-        tolerate(&mut config, &mut liberties, tolerance.name).unwrap();
-        let mut bench = Bench::with(built(config, &liberties, &[]).unwrap(), agv_config("agv-1"));
+        let (mut config, mut tolerances) = (config(), Vec::new());
+        tolerate(&mut config, &mut tolerances, tolerance.name).unwrap();
+        let mut bench = Bench::with(built(config, &tolerances, &[]).unwrap(), agv_config("agv-1"));
         bench.command("dispatch", json!({ "from": "n2", "to": "n4", "loadType": "EPAL" }));
         bench.wait(40.0);
         assert_eq!(bench.state()["lastNodeId"], "n4", "{}", tolerance.name);
@@ -278,7 +278,7 @@ fn with_every_tolerance_transports_reach_their_end() {
 
 #[test]
 fn every_name_is_kebab_case_and_unique() {
-    let mut names: Vec<_> = super::records().map(|record| record.name).collect();
+    let mut names: Vec<_> = super::RECORDS.iter().map(|record| record.name).collect();
     let letters = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
     assert!(names.iter().all(|name| name.chars().all(letters)));
     names.sort_unstable();

@@ -1,31 +1,22 @@
 //! Deviations of MQTT and its topics: how it connects, what it subscribes to, where and how it publishes (6.1 to 6.3).
 
-use super::hooks::{fleet, plain};
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use crate::master_control::Site;
-use crate::master_control::seam::{Deviation, Event, Outgoing};
-use crate::master_control::vehicle::Vehicle;
 use crate::{ConnectOptions, Publication};
-use serde_json::{Value, json};
-use std::time::Duration;
-use tck_base::clock::Moment;
+
+use super::prelude::*;
 
 records! {
     fault "old-mqtt" ["MQTT-01"] "Connects with MQTT 3.1."
-        => plain().joins(|_, _, options| options.level = 3);
-    liberty "newest-mqtt" ["MQTT-01"] "Connects with MQTT 5."
-        => plain().joins(|_, _, options| options.level = 5);
-    liberty "session-kept" ["MQTT-01"] "Asks the broker to keep its session."
-        => plain().joins(|_, _, options| options.clean_session = false);
-    liberty "long-keep-alive" ["MQTT-01"] "It connects with a keep-alive of a minute."
-        => plain().joins(|_, _, options| options.keep_alive = Duration::from_secs(60));
-    liberty "new-client-id-each-time" ["MQTT-10", "TOPIC-15"] "It connects with another client identifier each time."
-        => plain().joins(|site, _, options| {
-            options.client_id = format!("{}-{}", site.config.name, site.now.utc.as_millisecond());
-        });
-    liberty "will-of-its-own" ["TOPIC-15"] "It has a last will on a topic of its own that is none of the protocol, in plain text."
-        => plain().joins(|site, _, options| {
+        => connecting(|_, _, options| options.level = 3);
+    tolerance "newest-mqtt" ["MQTT-01"] "Connects with MQTT 5."
+        => connecting(|_, _, options| options.level = 5);
+    tolerance "session-kept" ["MQTT-01"] "Asks the broker to keep its session."
+        => connecting(|_, _, options| options.clean_session = false);
+    tolerance "long-keep-alive" ["MQTT-01"] "It connects with a keep-alive of a minute."
+        => connecting(|_, _, options| options.keep_alive = Duration::from_secs(60));
+    tolerance "new-client-id-each-time" ["MQTT-10", "TOPIC-15"] "It connects with another client identifier each time."
+        => connecting(|site, _, options| options.client_id = format!("{}-{}", site.config.name, site.now.utc.as_millisecond()));
+    tolerance "will-of-its-own" ["TOPIC-15"] "It has a last will on a topic of its own that is none of the protocol, in plain text."
+        => connecting(|site, _, options| {
             options.will = Some(Publication {
                 topic: format!("{}/status", site.config.name),
                 payload: b"offline".to_vec(),
@@ -34,7 +25,7 @@ records! {
             });
         });
     fault "will-on-vehicle-topic" ["TOPIC-15"] "It registers a retained last will CONNECTIONBROKEN on the connection topic of its first vehicle."
-        => plain().joins(|site, fleet, options| {
+        => connecting(|site, fleet, options| {
             let Some(vehicle) = fleet.first() else { return };
             let message = json!({
                 "headerId": 0,
@@ -52,57 +43,47 @@ records! {
             });
         });
     fault "not-subscribed-again" ["TOPIC-14", "MQTT-10", "MODE-04", "ORD-03", "CONN-12"] "Does not subscribe again when it reconnects."
-        => plain().joins(|site, _, options| {
-            if site.connection.returning {
-                options.subscriptions.clear();
-            }
-        });
+        => connecting(|site, _, options| if site.connection.returning { options.subscriptions.clear(); });
     fault "state-not-subscribed" ["TOPIC-14"] "Does not subscribe to the state."
-        => plain().joins(|_, _, options| without(options, "state"));
+        => connecting(|_, _, options| without(options, "state"));
     fault "connection-not-subscribed" ["TOPIC-14", "CONN-12"] "Does not subscribe to the connection topic."
-        => plain().joins(|_, _, options| without(options, "connection"));
+        => connecting(|_, _, options| without(options, "connection"));
     fault "factsheet-not-subscribed" ["TOPIC-14"] "Does not subscribe to the factsheet."
-        => plain().joins(|_, _, options| without(options, "factsheet"));
-    liberty "visualization-not-subscribed" ["VIS-03", "TOPIC-14"] "It does not subscribe to visualization at all."
-        => plain().joins(|_, _, options| without(options, "visualization"));
+        => connecting(|_, _, options| without(options, "factsheet"));
+    tolerance "visualization-not-subscribed" ["VIS-03", "TOPIC-14"] "It does not subscribe to visualization at all."
+        => connecting(|_, _, options| without(options, "visualization"));
     fault "factsheet-unsubscribed-after-reconnect" ["TOPIC-14"] "It does not subscribe to the factsheet topics again after it has lost its connection."
-        => plain().joins(|site, _, options| {
-            if site.connection.returning {
-                without(options, "factsheet");
-            }
-        });
+        => connecting(|site, _, options| if site.connection.returning { without(options, "factsheet"); });
     fault "factsheet-of-first-vehicle-only" ["TOPIC-14"] "It subscribes to the factsheet topic of the first vehicle of its fleet only."
-        => plain().joins(|_, fleet, options| {
+        => connecting(|_, fleet, options| {
             let first = fleet.first().and_then(|vehicle| vehicle.topic("factsheet")).unwrap_or_default();
             options.subscriptions.retain(|(topic, _)| topic == first || !topic.ends_with("/factsheet"));
         });
     fault "connection-with-qos-0" ["TOPIC-14"] "Subscribes to the connection topic with QoS 0."
         because "The QoS is asked of whoever publishes; the ruling of TOPIC-14 is a warning."
-        => plain().joins(|_, _, options| options.subscriptions.iter_mut().for_each(|(_, qos)| *qos = 0));
-    liberty "subscribes-with-qos-1" ["TOPIC-14"] "Subscribes with QoS 1."
-        => plain().joins(|_, _, options| options.subscriptions.iter_mut().for_each(|(_, qos)| *qos = 1));
-    liberty "subscribes-with-wildcards" ["TOPIC-14"] "Subscribes to everything the vehicles publish with one filter for each topic."
-        => plain().joins(|_, _, options| {
-            for (topic, _) in &mut options.subscriptions {
-                *topic = with_wildcards(topic);
-            }
+        => connecting(|_, _, options| options.subscriptions.iter_mut().for_each(|(_, qos)| *qos = 0));
+    tolerance "subscribes-with-qos-1" ["TOPIC-14"] "Subscribes with QoS 1."
+        => connecting(|_, _, options| options.subscriptions.iter_mut().for_each(|(_, qos)| *qos = 1));
+    tolerance "subscribes-with-wildcards" ["TOPIC-14"] "Subscribes to everything the vehicles publish with one filter for each topic."
+        => connecting(|_, _, options| {
+            for (topic, _) in &mut options.subscriptions { *topic = with_wildcards(topic); }
             options.subscriptions.sort();
             options.subscriptions.dedup();
         });
-    liberty "subscribes-twice" ["TOPIC-14"] "It subscribes to each topic both exactly and with wildcards, so that messages may come to it twice."
-        => plain().joins(|_, _, options| {
+    tolerance "subscribes-twice" ["TOPIC-14"] "It subscribes to each topic both exactly and with wildcards, so that messages may come to it twice."
+        => connecting(|_, _, options| {
             let mut wide: Vec<_> = options.subscriptions.iter().map(|(topic, qos)| (with_wildcards(topic), *qos)).collect();
             wide.sort();
             wide.dedup();
             options.subscriptions.extend(wide);
         });
-    liberty "listens-to-own-topics" ["TOPIC-14", "TOPIC-15"] "It also subscribes to order and instantActions."
-        => plain().joins(|_, fleet, options| {
+    tolerance "listens-to-own-topics" ["TOPIC-14", "TOPIC-15"] "It also subscribes to order and instantActions."
+        => connecting(|_, fleet, options| {
             let own = fleet.iter().flat_map(|vehicle| ["order", "instantActions"].map(|name| vehicle.topic(name)));
             options.subscriptions.extend(own.flatten().map(|topic| (topic.to_owned(), 0)));
         });
-    liberty "subscribes-to-everything" ["TOPIC-14", "TOPIC-15"] "It subscribes to all topics of the interface with one filter."
-        => plain().joins(|_, fleet, options| {
+    tolerance "subscribes-to-everything" ["TOPIC-14", "TOPIC-15"] "It subscribes to all topics of the interface with one filter."
+        => connecting(|_, fleet, options| {
             let topic = fleet.first().and_then(|vehicle| vehicle.topic("state")).unwrap_or_default();
             let levels: Vec<&str> = topic.split('/').collect();
             let all = match levels.len().checked_sub(3) {
@@ -113,34 +94,28 @@ records! {
         });
     fault "order-qos-1" ["MQTT-06"] "Publishes orders with QoS 1."
         because "A higher QoS delivers the order as well; the ruling of MQTT-06 is a warning."
-        => plain().sends(|_, _, _, out| qos(out, 1, out.name == "order"));
+        => sending(|_, _, out| qos(out, 1, out.name == "order"));
     fault "instant-actions-qos-2" ["MQTT-06"] "Publishes instant actions with QoS 2."
         because "A higher QoS delivers the actions as well; the ruling of MQTT-06 is a warning."
-        => plain().sends(|_, _, _, out| qos(out, 2, out.name == "instantActions"));
+        => sending(|_, _, out| qos(out, 2, out.name == "instantActions"));
     fault "cancel-qos-one" ["MQTT-06"] "It publishes instantActions with cancelOrder with QoS 1."
         because "The ruling of MQTT-06 makes a higher quality of service a warning: a cancelOrder with QoS 1 harms nobody."
-        => plain().sends(|_, _, _, out| qos(out, 1, out.tells(&["cancelOrder"])));
+        => sending(|_, _, out| qos(out, 1, out.tells(&["cancelOrder"])));
     fault "resend-qos-one" ["MQTT-06"] "It publishes an order that was lost again with QoS 1."
         because "The ruling of MQTT-06 makes a higher quality of service a warning: a repetition with QoS 1 harms nobody."
-        => plain().sends(|_, _, _, out| qos(out, 1, out.again));
+        => sending(|_, _, out| qos(out, 1, out.again));
     fault "updates-qos-one" ["MQTT-06"] "It publishes updates of orders with QoS 1, and new orders with QoS 0."
         because "The ruling of MQTT-06 makes a higher quality of service a warning: an update with QoS 1 harms nobody."
-        => plain().sends(|_, _, _, out| qos(out, 1, out.is_update()));
+        => sending(|_, _, out| qos(out, 1, out.is_update()));
     fault "qos-one-after-reconnect" ["MQTT-06"] "It publishes orders and instant actions with QoS 1 once it has lost its connection to the broker."
         because "The ruling of MQTT-06 makes a higher quality of service a warning, before and after a reconnect."
-        => plain().sends(|_, site, _, out| qos(out, 1, site.connection.losses > 0));
+        => sending(|site, _, out| qos(out, 1, site.connection.losses > 0));
     fault "orders-retained" ["MQTT-06"] "Publishes orders with RETAIN, so that a vehicle that is new to the broker drives off."
         because "No sentence forbids RETAIN on these topics; the ruling of MQTT-06 is a warning."
-        => plain().sends(|_, _, _, out| {
-            out.retain = out.name == "order";
-            true
-        });
+        => sending(|_, _, out| out.retain = out.name == "order");
     fault "instant-actions-retained" ["MQTT-06"] "Publishes instant actions with RETAIN."
         because "No sentence forbids RETAIN on these topics; the ruling of MQTT-06 is a warning."
-        => plain().sends(|_, _, _, out| {
-            out.retain = out.name == "instantActions";
-            true
-        });
+        => sending(|_, _, out| out.retain = out.name == "instantActions");
     fault "topic-underscore" ["TOPIC-01", "TOPIC-13"] "Sends instant actions on a topic spelled with an underscore."
         => instants_on(|_, topic| topic.replace("instantActions", "instant_actions"));
     fault "instant-topic-lower-case" ["TOPIC-01", "TOPIC-13"] "It publishes instant actions on a topic that ends with instantactions in lower case."
@@ -151,9 +126,7 @@ records! {
         => instants_on(|_, topic| {
             let mut levels: Vec<&str> = topic.split('/').collect();
             let end = levels.len();
-            if end >= 4 {
-                levels.swap(end - 2, end - 3);
-            }
+            if end >= 4 { levels.swap(end - 2, end - 3); }
             levels.join("/")
         });
     fault "instant-actions-as-orders" ["TOPIC-13", "IACT-01"] "Sends instant actions on the order topic."
@@ -174,39 +147,24 @@ records! {
             topic.split('/').map(|level| if level == major { &full } else { level }).collect::<Vec<_>>().join("/")
         });
     fault "updates-on-own-topic" ["TOPIC-01", "TOPIC-13"] "It publishes order updates on a topic orderUpdate instead of order."
-        => plain().sends(|_, _, _, out| {
-            if out.is_update() {
-                out.topic.push_str("Update");
-            }
-            true
-        });
+        => sending(|_, _, out| if out.is_update() { out.topic.push_str("Update"); });
     fault "map-actions-on-map-topic" ["TOPIC-01", "TOPIC-13"] "It publishes downloadMap, enableMap and deleteMap on a topic mapActions of its own."
-        => plain().sends(|_, _, _, out| {
-            if out.tells(&["downloadMap", "enableMap", "deleteMap"]) {
-                out.topic = out.topic.replace("instantActions", "mapActions");
-            }
-            true
-        });
+        => sending(|_, _, out| if out.tells(&["downloadMap", "enableMap", "deleteMap"]) { out.topic = out.topic.replace("instantActions", "mapActions"); });
     fault "pause-to-first-vehicle" ["TOPIC-13", "TOPIC-04"] "It publishes startPause and stopPause for any vehicle on the topic of the first vehicle of the fleet."
-        => plain().sends(|_, site, _, out| {
+        => sending(|site, _, out| {
             let first = site.config.vehicles.first().and_then(|first| first.topics.get("instantActions"));
-            if let Some(first) = first.filter(|_| out.tells(&["startPause", "stopPause"])) {
-                out.topic.clone_from(first);
-            }
-            true
+            if let Some(first) = first.filter(|_| out.tells(&["startPause", "stopPause"])) { out.topic.clone_from(first); }
         });
     fault "update-to-vehicle-served-last" ["TOPIC-13", "TOPIC-04"]
         "It publishes order updates on the topic of the vehicle that was given a new order last, whichever vehicle they are for."
         => fleet::<String>().sends(|served, _, _, out| {
             if out.is_new_order() {
                 served.clone_from(&out.topic);
-            } else if out.is_update() && !served.is_empty() {
-                out.topic.clone_from(served);
-            }
+            } else if out.is_update() && !served.is_empty() { out.topic.clone_from(served); }
             true
         });
     fault "path-on-visualization" ["TOPIC-15"] "With every order it publishes a visualization message for the vehicle with the place where the order begins."
-        => plain().sends(|_, site, vehicle, out| {
+        => sending(|site, vehicle, out| {
             let position = out.message.get("nodes").and_then(|nodes| nodes.pointer("/0/nodePosition")).cloned();
             let topic = vehicle.topic("visualization").map(str::to_owned);
             if let Some(position) = position.filter(|_| out.name == "order") && let Some(topic) = topic {
@@ -216,26 +174,23 @@ records! {
                 message.set("agvPosition", place);
                 site.push(topic, Value::Object(message).to_string().into_bytes(), 0, false);
             }
-            true
         });
     fault "announces-itself-online" ["TOPIC-15"] "Whenever it connects it publishes a retained ONLINE on the connection topics of its vehicles."
-        => plain().happens(|_, site, vehicle, event| {
+        => happening(|site, vehicle, event| {
             if let Event::Connected(_) = event && let Some(topic) = vehicle.topic("connection").map(str::to_owned) {
                 let mut message = site.header(vehicle, "connection");
                 message.set("connectionState", "ONLINE");
                 site.push(topic, Value::Object(message).to_string().into_bytes(), 1, true);
             }
         });
-    liberty "clears-retained-order-topics" ["MQTT-02", "TOPIC-13"]
+    tolerance "clears-retained-order-topics" ["MQTT-02", "TOPIC-13"]
         "It publishes an empty retained message on order and instantActions when it starts, to clear leftovers."
-        => plain().happens(|_, site, vehicle, event| {
+        => happening(|site, vehicle, event| {
             if let Event::Connected(false) = event {
-                for topic in ["order", "instantActions"].map(|name| vehicle.topic(name)).into_iter().flatten() {
-                    site.push(topic.to_owned(), Vec::new(), 0, true);
-                }
+                for topic in ["order", "instantActions"].map(|name| vehicle.topic(name)).into_iter().flatten() { site.push(topic.to_owned(), Vec::new(), 0, true); }
             }
         });
-    liberty "heartbeat-outside-the-protocol" ["TOPIC-01", "TOPIC-15"] "It publishes a heartbeat of its own on a topic outside the tree of the protocol."
+    tolerance "heartbeat-outside-the-protocol" ["TOPIC-01", "TOPIC-15"] "It publishes a heartbeat of its own on a topic outside the tree of the protocol."
         => fleet::<Option<Moment>>().happens(|beat, site, vehicle, event| {
             if let Event::Looked = event {
                 let now = site.now.moment;
@@ -267,29 +222,28 @@ fn with_wildcards(topic: &str) -> String {
     levels.join("/")
 }
 
-fn qos(outgoing: &mut Outgoing, qos: u8, when: bool) -> bool {
+fn qos(outgoing: &mut Outgoing, qos: u8, when: bool) {
     if when {
         outgoing.qos = qos;
     }
-    true
 }
+
+type Topic = fn(&str, &str) -> String;
 
 /// Publishes messages of a topic on another one, by the protocol version and the right topic.
-struct Misdirected(&'static str, fn(&str, &str) -> String);
-
-fn instants_on(topic: fn(&str, &str) -> String) -> Box<Misdirected> {
-    Box::new(Misdirected("instantActions", topic))
-}
-
-fn orders_on(topic: fn(&str, &str) -> String) -> Box<Misdirected> {
-    Box::new(Misdirected("order", topic))
-}
-
-impl Deviation for Misdirected {
-    fn publishes(&mut self, site: &mut Site, _: &mut Vehicle, outgoing: &mut Outgoing) -> bool {
-        if outgoing.name == self.0 {
-            outgoing.topic = self.1(&site.config.version, &outgoing.topic);
+fn misdirected(name: &'static str, topic: Topic) -> Box<dyn Deviation> {
+    holding((name, topic)).sends(|(name, topic), site, _, out| {
+        if out.name == *name {
+            out.topic = topic(&site.config.version, &out.topic);
         }
         true
-    }
+    })
+}
+
+fn instants_on(topic: Topic) -> Box<dyn Deviation> {
+    misdirected("instantActions", topic)
+}
+
+fn orders_on(topic: Topic) -> Box<dyn Deviation> {
+    misdirected("order", topic)
 }

@@ -1,39 +1,25 @@
 //! Deviations of what updates of an order say: numbers, stitching node, what was sent before (section 6.6.2).
 
-use super::hooks::{Hooks, Object, edge, keep, order, plain, shift, update};
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use crate::master_control::Site;
-use crate::master_control::seam::{Deviation, Event, Outgoing, Permission};
-use crate::master_control::vehicle::Vehicle;
-use serde_json::{Value, json};
+use super::prelude::*;
 
 records! {
     fault "order-id-per-update" ["ORD-UPD-04"] "Gives every update an orderId of its own."
-        => plain().sends(|(), _, _, out| {
-            if out.is_update() {
-                out.message.set("orderId", format!("{}-{}", out.message.text("orderId"), out.message["orderUpdateId"]));
-            }
-            true
-        }).allows(|(), _, _, what, usual| usual && !matches!(what, Permission::Gone));
+        => update(|m| m.set("orderId", format!("{}-{}", m.text("orderId"), m["orderUpdateId"])))
+            .allows(|_, _, _, what, usual| usual && !matches!(what, Permission::Gone));
     fault "update-id-kept" ["ORD-UPD-04"] "Does not raise orderUpdateId."
         => order(|m| m.set("orderUpdateId", 0));
     fault "update-id-falls" ["ORD-UPD-04"] "Counts orderUpdateId down."
         => order(|m| m.set("orderUpdateId", 1000_u64.saturating_sub(m["orderUpdateId"].as_u64().unwrap_or_default())));
     fault "stitching-missing" ["ORD-UPD-05"] "Begins updates with the first new node."
         => update(|m| for list in ["nodes", "edges"] {
-            m.change(list, |elements| if let Some(elements) = elements.as_array_mut() && elements.len() > usize::from(list == "nodes") {
-                elements.remove(0);
-            });
+            m.change(list, |elements| if let Some(elements) = elements.as_array_mut() && elements.len() > usize::from(list == "nodes") { elements.remove(0); });
         });
     fault "stitching-moved" ["ORD-UPD-06"] "Rounds the position of the stitching node to decimetres, and shifts it."
         => stitching(|node, _| node.part("nodePosition", |place| shift(place, "x", 0.3)));
     fault "stitching-action-added" ["ORD-UPD-06"] "Adds an action to the stitching node."
         => stitching(|node, id| node.add("actions", json!({ "actionType": "beep", "actionId": id, "blockingType": "NONE" })));
     fault "stitching-actions-renamed" ["ORD-UPD-06"] "The actions of the stitching node have other actionIds in an order update than before."
-        => stitching(|node, id| node.each("actions", |action| {
-            action.set("actionId", format!("{}-{id}", action.text("actionId")));
-        }));
+        => stitching(|node, id| node.each("actions", |action| action.set("actionId", format!("{}-{id}", action.text("actionId")))));
     fault "stitching-deviation-widened" ["ORD-UPD-06", "OPT-03"] "The stitching node has an allowedDeviationXY of 1 m in order updates, whatever it had before."
         because "ORD-UPD-06 fails altered positions and added actions; how close the vehicle has to pass may be corrected."
         => stitching(|node, _| node.part("nodePosition", |place| place.set("allowedDeviationXY", 1.0)));
@@ -46,7 +32,7 @@ records! {
         => stitching(|node, _| node.set("released", false));
     fault "stitching-theta-towards-next" ["ORD-UPD-06", "OPT-03"] "It gives the first node of an update a theta that points along the next edge."
         because "ORD-UPD-06 fails altered positions and added actions; an angle where none was given is warned of."
-        => plain().words(|(), _, _, worded, m| {
+        => composing(|_, _, worded, m| {
             let stops = &worded.running.stops;
             worded.nodes(m, |index, here, node| {
                 if worded.is_update() && index == worded.window.first && let Some(next) = stops.get(index + 1) {
@@ -59,11 +45,7 @@ records! {
             Event::Led(_) => *led = true,
             Event::Begun => *led = false,
             _ => {}
-        }).words(|led, _, _, worded, m| {
-            if *led && worded.is_update() && worded.running.changed {
-                m.list("nodes")[0]["released"] = json!(false);
-            }
-        });
+        }).words(|led, _, _, worded, m| if *led && worded.is_update() && worded.running.changed { m.list("nodes")[0]["released"] = json!(false); });
     fault "sequence-from-one" ["ORD-UPD-11"] "Numbers nodes and edges from 1."
         => numbered(|sequence, _| sequence + 1);
     fault "sequence-per-kind" ["ORD-UPD-11"] "Numbers nodes and edges separately."
@@ -76,21 +58,13 @@ records! {
     fault "edges-share-number-of-start-node" ["ORD-UPD-11"] "It gives each edge the sequenceId of the node where it begins."
         => edge(|e| e.change("sequenceId", |id| *id = json!(id.as_u64().unwrap_or_default() - 1)));
     fault "update-edges-numbered-from-one" ["ORD-UPD-12", "ORD-UPD-11"] "It numbers the edges of each update from 1 on again, while the nodes keep their numbers."
-        => plain().words(|(), _, _, worded, m| worded.edges(m, |index, _, edge| {
-            if worded.is_update() {
-                edge.set("sequenceId", 2 * (index - worded.window.first) + 1);
-            }
-        }));
+        => edges(|_, worded, index, _, edge| if worded.is_update() { edge.set("sequenceId", 2 * (index - worded.window.first) + 1); });
     fault "loop-numbered-by-node" ["ORD-UPD-11"] "Gives a node that the way passes twice the sequenceId of the first time."
         => numbered_by_node();
     fault "edge-into-last-base-node-unreleased" ["ORD-09"] "It leaves the edge into the last base node of an update unreleased, although the node is released."
-        => plain().words(|(), _, _, worded, m| worded.edges(m, |index, _, edge| {
-            if worded.is_update() && index + 2 == worded.window.released {
-                edge.set("released", false);
-            }
-        }));
+        => edges(|_, worded, index, _, edge| if worded.is_update() && index + 2 == worded.window.released { edge.set("released", false); });
     fault "update-keeps-incoming-edge" ["ORD-02", "ORD-UPD-05"] "It begins the edges of an update with the edge that leads to the first node."
-        => plain().words(|(), _, _, worded, m| {
+        => composing(|_, _, worded, m| {
             let before = worded.window.first.checked_sub(1);
             let leg = before.and_then(|before| Some((before, worded.running.legs.get(before)?)));
             if let Some((before, leg)) = leg && let Some(edges) = m.get_mut("edges").and_then(Value::as_array_mut) {
@@ -105,54 +79,39 @@ records! {
         => update(|m| for list in ["nodes", "edges"] {
             let added = m.list(list).iter_mut().skip(usize::from(list == "nodes")).filter_map(Value::as_object_mut);
             added.for_each(|element| element.each("actions", |action| {
-                if action.says("actionType", "pick") {
-                    action.keep("actionParameters", |parameter| !parameter.says("key", "lhd"));
-                }
+                if action.says("actionType", "pick") { action.keep("actionParameters", |parameter| !parameter.says("key", "lhd")); }
             }));
         });
 }
 
 /// Changes the first node of updates; the text is another for each of them.
 fn stitching(change: fn(&mut Object, &str)) -> Box<dyn Deviation> {
-    struct Stitching(fn(&mut Object, &str));
-    impl Deviation for Stitching {
-        fn publishes(&mut self, _: &mut Site, _: &mut Vehicle, outgoing: &mut Outgoing) -> bool {
-            let id = format!(
-                "added-{}",
-                outgoing.message.get("orderUpdateId").unwrap_or(&Value::Null)
-            );
-            if outgoing.is_update()
-                && let Some(Value::Object(node)) = outgoing.message.list("nodes").first_mut()
-            {
-                self.0(node, &id);
-            }
-            true
+    holding(change).sends(|change, _, _, out| {
+        let id = format!("added-{}", out.message.get("orderUpdateId").unwrap_or(&Value::Null));
+        if out.is_update()
+            && let Some(Value::Object(node)) = out.message.list("nodes").first_mut()
+        {
+            change(node, &id);
         }
-    }
-    Box::new(Stitching(change))
+        true
+    })
 }
 
 /// Numbers nodes and edges otherwise, knowing the number of the first node.
 fn numbered(number: fn(u64, u64) -> u64) -> Box<dyn Deviation> {
-    struct Numbered(fn(u64, u64) -> u64);
-    impl Deviation for Numbered {
-        fn publishes(&mut self, _: &mut Site, _: &mut Vehicle, outgoing: &mut Outgoing) -> bool {
-            let first = outgoing
-                .message
-                .list("nodes")
-                .first()
-                .and_then(|node| node["sequenceId"].as_u64());
-            for list in ["nodes", "edges"] {
-                outgoing.message.each(list, |element| {
-                    element.change("sequenceId", |id| {
-                        *id = json!(self.0(id.as_u64().unwrap_or_default(), first.unwrap_or_default()));
-                    })
-                });
-            }
-            true
-        }
-    }
-    Box::new(Numbered(number))
+    holding(number).sends(|number, _, _, out| {
+        let first = out
+            .message
+            .list("nodes")
+            .first()
+            .and_then(|node| node["sequenceId"].as_u64());
+        each_element(&mut out.message, |element| {
+            element.change("sequenceId", |id| {
+                *id = json!(number(id.as_u64().unwrap_or_default(), first.unwrap_or_default()));
+            });
+        });
+        true
+    })
 }
 
 fn numbered_by_node() -> Box<Hooks<()>> {

@@ -1,7 +1,7 @@
 //! Personas: how a mock vehicle deviates when a test of a master control tells it to.
 //!
 //! Each word of [`tck_profile::VEHICLE_WORDS`] that a vehicle does not know by itself is one way to be awkward. A
-//! [`Persona`] holds what was told, and takes hold at the seam of the vehicle; all of it ends together, with
+//! [`Persona`] holds what was told, and takes hold at the hook points of the vehicle; all of it ends together, with
 //! `well-behaved` or `reset`.
 
 mod declared;
@@ -14,11 +14,11 @@ use std::time::Duration;
 
 use serde_json::{Map, Value, json};
 
-use crate::agv::action_kinds::Deed;
+use crate::agv::action_effect::{Outcome, Problem};
+use crate::agv::action_kinds::Effect;
 use crate::agv::actions::{Action, Status};
-use crate::agv::deeds::{Outcome, Problem};
 use crate::agv::errors::{ActiveError, Life};
-use crate::agv::seam::{Deviation, Event, Head, Leg, Outgoing, Part, Permission, Span};
+use crate::agv::hooks::{Deviation, Event, Head, Leg, Outgoing, Part, Permission, Span};
 use crate::agv::{Agv, AgvConfig};
 use tck_base::clock::Moment;
 
@@ -93,7 +93,7 @@ struct Persona {
 impl Persona {
     /// The errorType with which an action fails.
     fn failure_of(&self, action: &Action) -> Option<&String> {
-        if is(action, Deed::DownloadMap) && action.status == Status::Waiting && self.map_refusal.is_some() {
+        if is(action, Effect::DownloadMap) && action.status == Status::Waiting && self.map_refusal.is_some() {
             return self.map_refusal.as_ref();
         }
         let (wanted, error_type) = self.failing.as_ref()?;
@@ -105,7 +105,7 @@ impl Persona {
 
     /// Stands from now on if it was told to do so before the node ahead.
     fn stand_if_told(&mut self, agv: &Agv) {
-        let ahead = agv.book.nodes.front();
+        let ahead = agv.order.nodes.front();
         if ahead.is_some_and(|stop| self.stop_before.as_ref() == Some(&stop.node.id)) {
             (self.halted, self.stop_before) = (true, None);
         }
@@ -140,7 +140,7 @@ impl Deviation for Persona {
         true
     }
 
-    fn publishes(&mut self, _: &mut Agv, outgoing: &mut Outgoing) -> bool {
+    fn sends(&mut self, _: &mut Agv, outgoing: &mut Outgoing) -> bool {
         if outgoing.name == "state" && self.lost_states > 0 {
             self.lost_states -= 1;
             return false;
@@ -197,7 +197,7 @@ impl Deviation for Persona {
         Some(Outcome::Open)
     }
 
-    fn due(&self) -> Option<Moment> {
+    fn due(&self, _: &Agv) -> Option<Moment> {
         self.cancel_held_until
     }
 
@@ -212,6 +212,6 @@ impl Deviation for Persona {
     }
 }
 
-fn is(action: &Action, deed: Deed) -> bool {
-    action.kind.is_some_and(|kind| kind.deed == deed)
+fn is(action: &Action, effect: Effect) -> bool {
+    action.kind.is_some_and(|kind| kind.effect == effect)
 }

@@ -47,8 +47,8 @@ impl Persona {
         if order.graph_defect().is_some() || agv.check_ids(&order).is_err() {
             return false;
         }
-        let new = order.id != agv.book.order_id;
-        if !new && order.update_id <= agv.book.update_id {
+        let new = order.id != agv.order.order_id;
+        if !new && order.update_id <= agv.order.update_id {
             return false;
         }
         let slot = if new { &mut self.new_orders } else { &mut self.updates };

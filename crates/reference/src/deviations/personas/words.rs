@@ -139,7 +139,7 @@ fn renew(agv: &mut Agv, node: Option<&str>) {
     let mut fresh = Agv::new(config);
     agv.downloads.clear();
     std::mem::swap(&mut fresh.config.start_node, &mut agv.config.start_node);
-    std::mem::swap(&mut fresh.seam, &mut agv.seam);
+    std::mem::swap(&mut fresh.hooks, &mut agv.hooks);
     fresh.now = agv.now;
     fresh.states_sent = agv.states_sent;
     fresh.logs = agv.logs;

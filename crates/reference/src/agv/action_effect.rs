@@ -10,16 +10,16 @@ use std::f64::consts::PI;
 use std::time::Duration;
 
 use super::Agv;
-use super::action_kinds::{ActionKind, Deed};
+use super::action_kinds::{ActionKind, Effect};
 use super::actions::{Action, Origin, Status};
 use super::errors::{ActiveError, Life};
+use super::hook_points::{Event, Permission, Span};
 use super::motion::Pose;
-use super::points::{Event, Permission, Span};
 
 /// Coordinates beyond this are no place on any map of the site, in metres.
 const FARTHEST: f64 = 10_000.0;
 
-/// Which error a failed action raises.
+/// Kind of problem with an action, and so the error it raises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Area {
     InstantAction,
@@ -38,7 +38,7 @@ pub(crate) struct Problem {
 }
 
 impl Problem {
-    /// What went wrong with an action.
+    /// A problem with an action.
     pub(crate) fn new(area: Area, action: &Action, reason: &str) -> Self {
         let reference = |key: &str, value: &str| (key.to_owned(), value.to_owned());
         let references = vec![
@@ -67,7 +67,7 @@ impl Problem {
     }
 }
 
-/// How a deed went.
+/// Result of the effect of an action.
 pub(crate) enum Outcome {
     Done(Option<String>),
     Failed(Problem),
@@ -114,7 +114,7 @@ impl Agv {
 
     /// How long an action runs; something else ends what waits for a trigger, or for the end of an edge.
     fn duration_of(&self, action: &Action) -> Duration {
-        let endless = |kind: &ActionKind| matches!(kind.deed, Deed::WaitForTrigger | Deed::WarningLights);
+        let endless = |kind: &ActionKind| matches!(kind.effect, Effect::WaitForTrigger | Effect::WarningLights);
         let usual = match action.kind.is_some_and(endless) {
             true => Duration::MAX,
             false => self.working_time(action),
@@ -145,7 +145,7 @@ impl Agv {
         if proceeds != Some(true) {
             return;
         }
-        if action.kind.is_some_and(|kind| kind.deed == Deed::DownloadMap) {
+        if action.kind.is_some_and(|kind| kind.effect == Effect::DownloadMap) {
             self.download_failed(id, "the server did not deliver in time");
             return;
         }
@@ -164,8 +164,8 @@ impl Agv {
         let outcome = match self.does(&action) {
             Some(outcome) => outcome,
             None => {
-                let outcome = self.deed(&action);
-                self.turned_out(&action, outcome)
+                let outcome = self.effect(&action);
+                self.ends(&action, outcome)
             }
         };
         self.conclude(id, outcome);
@@ -221,44 +221,44 @@ impl Agv {
         self.raise_failure(action.as_ref(), error);
     }
 
-    fn deed(&mut self, action: &Action) -> Outcome {
+    fn effect(&mut self, action: &Action) -> Outcome {
         let Some(kind) = action.kind else { return Outcome::Open };
-        match kind.deed {
-            Deed::StartPause => self.start_pause(action),
-            Deed::StopPause => self.stop_pause(action),
-            Deed::StartCharging => self.start_charging(action).into(),
-            Deed::StopCharging => self.stop_charging(action).into(),
-            Deed::InitPosition => self.init_position(action).into(),
-            Deed::EnableMap => {
+        match kind.effect {
+            Effect::StartPause => self.start_pause(action),
+            Effect::StopPause => self.stop_pause(action),
+            Effect::StartCharging => self.start_charging(action).into(),
+            Effect::StopCharging => self.stop_charging(action).into(),
+            Effect::InitPosition => self.init_position(action).into(),
+            Effect::EnableMap => {
                 let result = self.maps.enable(action.text("mapId"), action.text("mapVersion"));
                 result.map_err(|reason| Problem::map(action, reason)).into()
             }
-            Deed::DeleteMap => self.delete_map(action).into(),
-            Deed::StateRequest => {
+            Effect::DeleteMap => self.delete_map(action).into(),
+            Effect::StateRequest => {
                 self.report.requested = true;
                 Outcome::Done(None)
             }
-            Deed::LogReport => {
+            Effect::LogReport => {
                 self.logs += 1;
                 let name = format!("log-{}.txt", self.logs);
                 Outcome::Done(Some(name))
             }
-            Deed::Pick => self.pick(action).into(),
-            Deed::Drop => self.put_down(action).into(),
-            Deed::DetectObject => self.detect(action),
-            Deed::FinePositioning => self.align(action).into(),
-            Deed::FactsheetRequest => {
+            Effect::Pick => self.pick(action).into(),
+            Effect::Drop => self.put_down(action).into(),
+            Effect::DetectObject => self.detect(action),
+            Effect::FinePositioning => self.align(action).into(),
+            Effect::FactsheetRequest => {
                 self.connection.factsheet_asked = true;
                 self.publish_factsheet();
                 self.connection.factsheet_asked = false;
                 Outcome::Done(None)
             }
-            Deed::WaitForTrigger | Deed::WarningLights | Deed::Beep | Deed::Calibrate => Outcome::Done(None),
-            Deed::CancelOrder => {
+            Effect::WaitForTrigger | Effect::WarningLights | Effect::Beep | Effect::Calibrate => Outcome::Done(None),
+            Effect::CancelOrder => {
                 self.cancel_order(&action.request.id);
                 Outcome::Open
             }
-            Deed::DownloadMap => self.begin_download(&action.request.id),
+            Effect::DownloadMap => self.begin_download(&action.request.id),
         }
     }
 
@@ -321,7 +321,7 @@ impl Agv {
         if !self.maps.on_board(map_id) {
             return invalid("the map is not on board");
         }
-        if action.origin == Origin::Instant && (!self.book.nodes.is_empty() || self.actions.order_unfinished()) {
+        if action.origin == Origin::Instant && (!self.order.nodes.is_empty() || self.actions.order_unfinished()) {
             return invalid("an order is active");
         }
         let pose = Pose {
@@ -339,13 +339,13 @@ impl Agv {
         self.happens(Event::Placed);
         self.maps.enable_any(&pose.map_id);
         self.motion.place(pose);
-        node.clone_into(&mut self.book.last_node);
+        node.clone_into(&mut self.order.last_node);
     }
 
     /// Deletes a map that is not in use (MAP-29, MAP-32, MAP-33).
     pub(crate) fn delete_map(&mut self, action: &Action) -> Result<(), Problem> {
         let here = self.motion.pose(self.moment()).map_id;
-        let needed: Vec<String> = self.book.nodes.iter().map(|stop| stop.place.map_id.clone()).collect();
+        let needed: Vec<String> = self.order.nodes.iter().map(|stop| stop.place.map_id.clone()).collect();
         let used = |map_id: &str| here == map_id || needed.iter().any(|needed| needed == map_id);
         let result = self.maps.delete(action.text("mapId"), action.text("mapVersion"), used);
         result.map_err(|reason| Problem::map(action, reason))

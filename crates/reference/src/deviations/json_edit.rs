@@ -2,13 +2,15 @@
 
 use serde_json::{Map, Value};
 
-/// Moves on a JSON object. What is not there is left alone.
-pub trait Words {
+/// Edits of a JSON object. What is not there is left alone.
+pub trait JsonEdit {
     /// Says something, instead of what was said there.
     fn set(&mut self, key: &str, value: impl Into<Value>);
+    /// Says something where nothing is said.
+    fn supply(&mut self, key: &str, value: impl Into<Value>);
     /// Says nothing of that any more.
     fn unset(&mut self, key: &str);
-    /// Says the same under another key.
+    /// Moves a member to another key.
     fn rename(&mut self, from: &str, to: &str);
     /// Changes a value that is there.
     fn change(&mut self, key: &str, change: impl FnOnce(&mut Value));
@@ -28,9 +30,13 @@ pub trait Words {
     fn says(&self, key: &str, value: impl Into<Value>) -> bool;
 }
 
-impl Words for Map<String, Value> {
+impl JsonEdit for Map<String, Value> {
     fn set(&mut self, key: &str, value: impl Into<Value>) {
         self.insert(key.to_owned(), value.into());
+    }
+
+    fn supply(&mut self, key: &str, value: impl Into<Value>) {
+        self.entry(key).or_insert_with(|| value.into());
     }
 
     fn unset(&mut self, key: &str) {

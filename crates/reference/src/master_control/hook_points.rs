@@ -1,9 +1,6 @@
-//! The points of decision: what may be allowed, lasts, is counted, happens, is planned, is made, comes in and goes out.
+//! The words of the hook points: what may be allowed, lasts, is counted, happens, is worded, comes in and goes out.
 //!
-//! What the master control does at each stands where it does it; `seam` is who else is asked.
-
-use std::collections::BTreeSet;
-use std::time::Duration;
+//! What the master control does at each stands where it does it; `hooks` is who else is asked.
 
 use serde_json::{Map, Value};
 
@@ -12,11 +9,9 @@ use super::dispatch::Way;
 use super::order::Window;
 use super::rerouting::Reroute;
 use super::seen::State;
-use super::vehicle::{MapJob, Presence, Running, Transport};
-use super::ways::Pose;
-use crate::ConnectOptions;
+use super::vehicle::{Leg, MapJob, Presence, Running, Stop, Transport};
 
-/// What is allowed or not.
+/// Something that is allowed or not.
 #[derive(Clone, Copy)]
 pub(crate) enum Permission<'a> {
     /// Anything is sent to the vehicle (CONN-12).
@@ -48,7 +43,7 @@ pub(crate) enum Permission<'a> {
     /// The base of an order is extended.
     Extend(&'a Running),
     /// newBaseRequest is heeded.
-    Heed(&'a Running),
+    Heed,
     /// The base grows now: so many nodes are left, and more was asked for or not.
     Grow(&'a Running, usize, bool),
     /// A lost order message is sent again.
@@ -65,7 +60,7 @@ pub(crate) enum Permission<'a> {
     OrderGone,
 }
 
-/// What has a length in time.
+/// Something that has a length in time.
 #[derive(Clone, Copy)]
 pub(crate) enum Span {
     /// From one order message to the next (FACT-13).
@@ -85,7 +80,7 @@ pub(crate) enum Occasion {
     Update { changed: bool, asked: bool },
 }
 
-/// What is counted.
+/// Something that is counted or limited.
 #[derive(Clone, Copy)]
 pub(crate) enum Measure<'a> {
     /// Nodes a message may have; it is an update or not (FACT-12).
@@ -168,39 +163,60 @@ pub(crate) enum Event<'a> {
     Placing(&'a mut Value, &'a mut bool),
 }
 
-/// What is planned.
-pub(crate) enum Plan<'a> {
-    /// Where the vehicle is, as the new order of a transport sees it.
-    Pose(&'a mut Pose, &'a Transport),
-    /// The edges that are not used between two nodes.
-    Route(&'a str, &'a str, &'a mut BTreeSet<(String, String)>),
-    /// A whole way, of a new order or behind the base of a running one.
-    Way(&'a mut Way, &'a Transport, bool),
-    /// What part of a way the next message holds, of so many nodes that are free.
-    Window(&'a Running, &'a mut Window, usize),
+/// Origin of an order message: its order, and the part of the way it shows.
+pub(crate) struct Worded<'a> {
+    pub(crate) running: &'a Running,
+    pub(crate) window: Window,
+    /// The way is longer than the vehicle takes in one message.
+    pub(crate) cut: bool,
 }
 
-/// What is made.
-pub(crate) enum Made<'a> {
-    /// An id of a kind: order, action, place, way.
-    Id(&'a str, &'a mut String),
-    /// An action, with the parameters that were handed over; an instant action or one of an order.
-    Action(&'a mut Value, &'a Value, bool),
-    /// An optional field.
-    Field(&'a Field<'a>, &'a mut Option<Value>),
-    /// An order message without header; the way is longer than the vehicle takes in one message or not.
-    Order(&'a Running, Window, bool, &'a mut Value),
+impl Worded<'_> {
+    /// Whether it is an update of an order.
+    pub(crate) fn is_update(&self) -> bool {
+        self.window.first > 0
+    }
+
+    /// Changes each node, knowing its place in the whole way.
+    pub(crate) fn nodes(
+        &self,
+        message: &mut Map<String, Value>,
+        mut change: impl FnMut(usize, &Stop, &mut Map<String, Value>),
+    ) {
+        let known = self.running.stops.iter().enumerate().skip(self.window.first);
+        for (node, (index, stop)) in entries(message, "nodes").zip(known) {
+            change(index, stop, node);
+        }
+    }
+
+    /// Changes each edge, knowing the place of the node before it in the whole way.
+    pub(crate) fn edges(
+        &self,
+        message: &mut Map<String, Value>,
+        mut change: impl FnMut(usize, &Leg, &mut Map<String, Value>),
+    ) {
+        let known = self.running.legs.iter().enumerate().skip(self.window.first);
+        for (edge, (index, leg)) in entries(message, "edges").zip(known) {
+            change(index, leg, edge);
+        }
+    }
+}
+
+/// The objects in a list of a message.
+fn entries<'a>(message: &'a mut Map<String, Value>, list: &str) -> impl Iterator<Item = &'a mut Map<String, Value>> {
+    let entries = message.get_mut(list).and_then(Value::as_array_mut);
+    entries.into_iter().flatten().filter_map(Value::as_object_mut)
 }
 
 /// An optional field of a node or an edge.
 pub(crate) struct Field<'a> {
     /// Its name in the factsheet, such as `order.edges.maxSpeed`.
     pub(crate) name: &'a str,
-    /// What the layout says.
+    /// Value in the layout.
     pub(crate) layout: Option<Value>,
-    /// What is sent where the vehicle demands it and the layout says nothing.
+    /// Value that is sent where the vehicle demands it and the layout says nothing.
     pub(crate) default: Value,
-    /// What the vehicle says to it.
+    /// Support the factsheet states for it.
     pub(crate) support: Option<&'a str>,
     /// The vehicle has no factsheet, and the field does no harm.
     pub(crate) harmless: bool,
@@ -264,15 +280,7 @@ impl Outgoing {
     }
 }
 
-/// How the connection to the broker is made.
-pub(crate) struct Joining {
-    /// What to connect with.
-    pub(crate) options: ConnectOptions,
-    /// How long to wait after a lost link; `None` for ever.
-    pub(crate) retry: Option<Duration>,
-}
-
-/// What has become of the running order.
+/// Fate of the running order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fate {
     /// It goes on.
@@ -283,6 +291,6 @@ pub(crate) enum Fate {
     Again,
     /// The rest has to be called off.
     CalledOff,
-    /// The same, because a trigger did not come in time.
+    /// The rest has to be called off because a trigger did not come in time.
     TooLate,
 }

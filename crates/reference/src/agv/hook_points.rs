@@ -1,15 +1,15 @@
 //! The points of decision: what may be done, lasts, is said, happens and goes out.
 //!
-//! What the vehicle does at each stands where it does it; `seam` is who else is asked.
+//! What the vehicle does at each stands where it does it; `hooks` is who else is asked.
 
 use serde_json::{Map, Value};
 
 use super::action_kinds::ActionKind;
 use super::actions::{Action, Origin};
-use super::book::Stop;
 use super::errors::ActiveError;
 use super::objections::Objection;
 use super::order_message::{Edge, Node, Order};
+use super::order_state::Stop;
 use super::rejection::Rule;
 use super::{Holds, Mode};
 
@@ -45,7 +45,7 @@ pub(crate) struct Head {
     pub(crate) counts: bool,
 }
 
-/// What is allowed or not.
+/// Something that is allowed or not.
 #[derive(Clone, Copy)]
 pub(crate) enum Permission<'a> {
     /// A message of a topic name goes out at all; without header.
@@ -152,7 +152,7 @@ pub(crate) enum Permission<'a> {
     StopForDefect,
 }
 
-/// What keeps the vehicle from driving.
+/// Reason for which the vehicle does not drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Hindrance {
     /// The mode (MODE-02).
@@ -184,7 +184,7 @@ pub(crate) enum Cause<'a> {
     Defect,
 }
 
-/// What has a length in time.
+/// Something that has a length in time.
 #[derive(Clone, Copy)]
 pub(crate) enum Span<'a> {
     /// From one state to the next (STATE-02).

@@ -1,4 +1,4 @@
-//! The order book: the order, what is left of it, and where the vehicle was last (sections 6.6.1, 6.10.1 and 6.10.2).
+//! The state of the order: the order itself, what is left of it, and where the vehicle was last (sections 6.6.1, 6.10.1 and 6.10.2).
 //!
 //! The orderId stays when the order is done or called off (the ruling of MODE-05).
 
@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 
 use super::order_message::{Edge, Node};
 
-/// Where a node is.
+/// Place of a node.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Place {
     pub(crate) x: f64,
@@ -32,7 +32,7 @@ pub(crate) struct Cancel {
 
 /// The order and its progress.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Book {
+pub(crate) struct OrderState {
     pub(crate) order_id: String,
     pub(crate) update_id: u32,
     pub(crate) last_node: String,
@@ -56,7 +56,7 @@ pub(crate) struct Book {
     pub(crate) previous: (String, u32),
 }
 
-impl Book {
+impl OrderState {
     /// No order yet.
     pub(crate) fn empty(last_node: String) -> Self {
         Self {

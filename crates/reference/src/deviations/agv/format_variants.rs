@@ -1,54 +1,43 @@
-//! Liberties in how a message is worded: what else it says, and how its JSON is written (sections 6.2 to 6.4 and 6.10).
+//! Tolerances in how a message is worded: what else it says, and how its JSON is written (sections 6.2 to 6.4 and 6.10).
 
-use super::hooks::Hooks;
-use super::hooks::Object;
-use super::hooks::header;
-use super::hooks::holding;
-use super::hooks::number;
-use super::hooks::plain;
-use super::hooks::sending;
-use crate::agv::Agv;
-use crate::agv::seam::Deviation;
-use crate::deviations::record::Record;
-use crate::deviations::words::Words;
-use serde::Serialize as _;
-use serde_json::Value;
-use serde_json::json;
-use serde_json::ser::CompactFormatter;
-use serde_json::ser::Formatter;
 use std::io;
 
+use serde::Serialize as _;
+use serde_json::ser::{CompactFormatter, Formatter};
+
+use super::prelude::*;
+
 records! {
-    liberty "vendor-information" ["INFO-01"] "Reports information nobody asked for."
+    tolerance "vendor-information" ["INFO-01"] "Reports information nobody asked for."
         => saying(|_, m| {
             let references = json!([{ "referenceKey": "place", "referenceValue": "hall 3" }]);
             m.add("information", json!({ "infoType": "tyrePressure", "infoLevel": "DEBUG", "infoReferences": references, "infoDescription": "2.4 bar" }));
         });
-    liberty "vendor-warning" ["ERR-01", "ERR-03"] "Reports a warning of its own all the time."
+    tolerance "vendor-warning" ["ERR-01", "ERR-03"] "Reports a warning of its own all the time."
         => saying(|_, m| m.add("errors", worn_brush()));
-    liberty "warning-comes-and-goes" ["ERR-01", "STATE-05"] "Reports a warning of its own in every other state."
+    tolerance "warning-comes-and-goes" ["ERR-01", "STATE-05"] "Reports a warning of its own in every other state."
         => saying(|agv, m| if is_even(agv) { m.add("errors", worn_brush()) });
-    liberty "information-comes-and-goes" ["INFO-01"] "An information entry of level DEBUG is in every other state."
+    tolerance "information-comes-and-goes" ["INFO-01"] "An information entry of level DEBUG is in every other state."
         => saying(|agv, m| if is_even(agv) {
             let references = json!([{ "referenceKey": "cycle", "referenceValue": "12 ms" }]);
             m.add("information", json!({ "infoType": "load", "infoLevel": "DEBUG", "infoReferences": references, "infoDescription": "the control was busy" }));
         });
-    liberty "information-in-every-state" ["STATE-11", "INFO-01"] "It puts an information entry with changing values into every state."
+    tolerance "information-in-every-state" ["STATE-11", "INFO-01"] "It puts an information entry with changing values into every state."
         => saying(|_, m| {
             let count = m.get("headerId").cloned().unwrap_or_default();
             m.add("information", json!({ "infoType": "cycleCounter", "infoLevel": "DEBUG", "infoDescription": format!("cycle {count}") }));
         });
-    liberty "action-states-reversed" ["STATE-MSG-09"] "It lists its action states with the newest first."
+    tolerance "action-states-reversed" ["STATE-MSG-09"] "It lists its action states with the newest first."
         => saying(|_, m| m.list("actionStates").reverse());
-    liberty "errors-newest-first" ["ERR-01"] "It lists its errors with the newest first."
+    tolerance "errors-newest-first" ["ERR-01"] "It lists its errors with the newest first."
         => saying(|_, m| m.list("errors").reverse());
-    liberty "maps-reversed" ["MAP-12"] "It lists its maps with the newest first."
+    tolerance "maps-reversed" ["MAP-12"] "It lists its maps with the newest first."
         => saying(|_, m| m.list("maps").reverse());
-    liberty "errors-in-own-language" ["JSON-03", "ERR-02"] "The errorDescription of every error is in another language, with letters and signs beyond ASCII."
+    tolerance "errors-in-own-language" ["JSON-03", "ERR-02"] "The errorDescription of every error is in another language, with letters and signs beyond ASCII."
         => saying(|_, m| m.each("errors", |error| error.set("errorDescription", "Störung – bitte Gerät prüfen (故障)")));
-    liberty "error-hints-given" ["ERR-02"] "Every error has an errorHint."
+    tolerance "error-hints-given" ["ERR-02"] "Every error has an errorHint."
         => saying(|_, m| m.each("errors", |error| error.set("errorHint", "see the manual, section 7")));
-    liberty "vendor-references" ["BP-02", "ERR-05"] "Every error begins its errorReferences with a key of the vendor."
+    tolerance "vendor-references" ["BP-02", "ERR-05"] "Every error begins its errorReferences with a key of the vendor."
         => saying(|_, m| m.each("errors", |error| {
             let own = json!({ "referenceKey": "vendorCode", "referenceValue": "E-17" });
             match error.get_mut("errorReferences") {
@@ -57,52 +46,52 @@ records! {
                 None => error.set("errorReferences", json!([own])),
             }
         }));
-    liberty "errors-undescribed" ["ERR-02"] "Its errors have no errorDescription."
+    tolerance "errors-undescribed" ["ERR-02"] "Its errors have no errorDescription."
         => saying(|_, m| m.each("errors", |error| error.unset("errorDescription")));
-    liberty "references-reversed" ["ERR-05", "BP-02"] "It lists what is wrong before the message in its error references."
+    tolerance "references-reversed" ["ERR-05", "BP-02"] "It lists what is wrong before the message in its error references."
         => saying(|_, m| m.each("errors", |error| error.list("errorReferences").reverse()));
-    liberty "empty-references-omitted" ["ERR-05", "ERR-02"] "Errors without references have no errorReferences."
+    tolerance "empty-references-omitted" ["ERR-05", "ERR-02"] "Errors without references have no errorReferences."
         => saying(|_, m| m.each("errors", |error| if error.says("errorReferences", json!([])) {
             error.unset("errorReferences");
         }));
-    liberty "action-type-omitted" ["STATE-MSG-14"] "Its action states have no actionType."
+    tolerance "action-type-omitted" ["STATE-MSG-14"] "Its action states have no actionType."
         => saying(|_, m| m.each("actionStates", |action| action.unset("actionType")));
-    liberty "results-empty" ["STATE-MSG-12"] "It gives every action state without a result an empty resultDescription."
+    tolerance "results-empty" ["STATE-MSG-12"] "It gives every action state without a result an empty resultDescription."
         => saying(|_, m| m.each("actionStates", |action| {
             action.entry("resultDescription").or_insert_with(|| json!(""));
         }));
-    liberty "results-everywhere" ["STATE-MSG-12"] "Every finished action has a resultDescription."
+    tolerance "results-everywhere" ["STATE-MSG-12"] "Every finished action has a resultDescription."
         => saying(|_, m| m.each("actionStates", |action| if action.says("actionStatus", "FINISHED") {
             action.entry("resultDescription").or_insert_with(|| json!("done"));
         }));
-    liberty "node-position-omitted" ["STATE-MSG-13"] "It does not repeat the nodePosition of the order in its node states."
+    tolerance "node-position-omitted" ["STATE-MSG-13"] "It does not repeat the nodePosition of the order in its node states."
         => saying(|_, m| m.each("nodeStates", |node| node.unset("nodePosition")));
-    liberty "route-described" ["STATE-MSG-13"] "Its node and edge states have descriptions."
+    tolerance "route-described" ["STATE-MSG-13"] "Its node and edge states have descriptions."
         => saying(|_, m| {
             m.each("nodeStates", |node| node.set("nodeDescription", "as it is called in the vehicle"));
             m.each("edgeStates", |edge| edge.set("edgeDescription", "as it is called in the vehicle"));
         });
-    liberty "maps-described" ["MAP-12"] "It gives every entry of maps a mapDescription."
+    tolerance "maps-described" ["MAP-12"] "It gives every entry of maps a mapDescription."
         => saying(|_, m| m.each("maps", |map| map.set("mapDescription", "as drawn in spring")));
-    liberty "new-base-only-when-wanted" ["STATE-16"] "It sends newBaseRequest only when it is true."
+    tolerance "new-base-only-when-wanted" ["STATE-16"] "It sends newBaseRequest only when it is true."
         => saying(|_, m| if m.says("newBaseRequest", false) {
             m.unset("newBaseRequest");
         });
-    liberty "optional-state-fields-left-out" ["STATE-MSG-01", "STATE-MSG-06"] "It leaves out the optional fields velocity, loads, information and newBaseRequest in all states."
+    tolerance "optional-state-fields-left-out" ["STATE-MSG-01", "STATE-MSG-06"] "It leaves out the optional fields velocity, loads, information and newBaseRequest in all states."
         => saying(|_, m| ["velocity", "loads", "information", "newBaseRequest"].into_iter().for_each(|key| m.unset(key)));
-    liberty "battery-minimal" ["STATE-MSG-15"] "Its batteryState consists of batteryCharge and charging."
+    tolerance "battery-minimal" ["STATE-MSG-15"] "Its batteryState consists of batteryCharge and charging."
         => saying(|_, m| m.part("batteryState", |battery| battery.retain(|key, _| key == "batteryCharge" || key == "charging")));
-    liberty "information-omitted" ["INFO-01", "STATE-MSG-01"] "It sends no information at all."
+    tolerance "information-omitted" ["INFO-01", "STATE-MSG-01"] "It sends no information at all."
         => saying(|_, m| m.unset("information"));
-    liberty "new-base-never-requested" ["STATE-16"] "It does not send newBaseRequest."
+    tolerance "new-base-never-requested" ["STATE-16"] "It does not send newBaseRequest."
         => saying(|_, m| m.unset("newBaseRequest"));
-    liberty "loads-undetermined" ["STATE-MSG-06"] "It cannot determine its load and never sends loads."
+    tolerance "loads-undetermined" ["STATE-MSG-06"] "It cannot determine its load and never sends loads."
         => saying(|_, m| m.unset("loads"));
-    liberty "loads-minimal" ["STATE-MSG-07"] "The loads name only loadId and loadType; the only load position, the dimensions and the weight are left out."
+    tolerance "loads-minimal" ["STATE-MSG-07"] "The loads name only loadId and loadType; the only load position, the dimensions and the weight are left out."
         => saying(|_, m| m.each("loads", |load| load.retain(|key, _| key == "loadId" || key == "loadType")));
-    liberty "descriptions-everywhere" ["STATE-MSG-14"] "Describes every action in its states."
+    tolerance "descriptions-everywhere" ["STATE-MSG-14"] "Describes every action in its states."
         => saying(|_, m| m.each("actionStates", |action| action.set("actionDescription", "as the vehicle understands it")));
-    liberty "optional-added" ["OPT-03"] "Fills optional members of its states others leave out."
+    tolerance "optional-added" ["OPT-03"] "Fills optional members of its states others leave out."
         => saying(|_, m| {
             m.set("distanceSinceLastNode", 0.0);
             m.part("agvPosition", |pose| {
@@ -115,53 +104,53 @@ records! {
                 battery.set("batteryHealth", 98);
             });
         });
-    liberty "optional-omitted" ["OPT-03"] "Leaves what it need not say out of its states."
+    tolerance "optional-omitted" ["OPT-03"] "Leaves what it need not say out of its states."
         => saying(|_, m| ["velocity", "distanceSinceLastNode"].into_iter().for_each(|key| m.unset(key)));
-    liberty "position-minimal" ["STATE-MSG-05"] "agvPosition holds only what it must hold, no localizationScore."
+    tolerance "position-minimal" ["STATE-MSG-05"] "agvPosition holds only what it must hold, no localizationScore."
         => wording(|_, m| m.part("agvPosition", |pose| {
             pose.retain(|key, _| matches!(key.as_str(), "positionInitialized" | "x" | "y" | "theta" | "mapId"));
         }));
-    liberty "visualization-without-velocity" ["VIS-01"] "The visualization tells the position but no velocity."
+    tolerance "visualization-without-velocity" ["VIS-01"] "The visualization tells the position but no velocity."
         => wording(|name, m| if name == "visualization" { m.unset("velocity") });
-    liberty "angles-rounded" ["JSON-06", "MAP-02"] "Writes its angles with four digits behind the point."
+    tolerance "angles-rounded" ["JSON-06", "MAP-02"] "Writes its angles with four digits behind the point."
         => wording(|_, m| m.part("agvPosition", |pose| number(pose, "theta", |angle| (angle * 10_000.0).round() / 10_000.0)));
     // As a 32-bit float holds it: pi is a little more than pi.
-    liberty "single-precision" ["JSON-06", "MAP-02"] "Computes where it is with 32-bit floats."
+    tolerance "single-precision" ["JSON-06", "MAP-02"] "Computes where it is with 32-bit floats."
         => wording(|name, m| if matches!(name, "state" | "visualization") {
             m.part("agvPosition", |pose| for axis in ["x", "y", "theta"] {
                 number(pose, axis, in_single_precision);
             });
         });
-    liberty "vendor-fields" ["JSON-04"] "Adds members of its own to every object it sends."
+    tolerance "vendor-fields" ["JSON-04"] "Adds members of its own to every object it sends."
         => wording(|_, m| with_vendor_fields(m));
-    liberty "floats-for-integers" ["JSON-09"] "Writes whole numbers with a fraction of zero."
+    tolerance "floats-for-integers" ["JSON-09"] "Writes whole numbers with a fraction of zero."
         => wording(|_, m| m.values_mut().for_each(with_fractions));
-    liberty "keys-reordered" ["JSON-01"] "Sends the members of its messages in reverse order."
+    tolerance "keys-reordered" ["JSON-01"] "Sends the members of its messages in reverse order."
         => wording(|_, m| *m = std::mem::take(m).into_iter().rev().collect());
-    liberty "pretty-printed" ["MQTT-02"] "Sends its messages in many lines, indented."
-        => plain().writes(|_, _, text| if let Ok(message) = serde_json::from_slice::<Value>(text) {
+    tolerance "pretty-printed" ["MQTT-02"] "Sends its messages in many lines, indented."
+        => plain().writes(|_, _, _, text| if let Ok(message) = serde_json::from_slice::<Value>(text) {
             *text = format!("{message:#}\n").into_bytes();
         });
-    liberty "text-escaped" ["JSON-03"] "Escapes letters in its texts that need it not."
-        => plain().writes(|_, _, text| written(text, Hand::Escaped));
-    liberty "exponents" ["JSON-06"] "Writes its coordinates with an exponent."
-        => plain().writes(|_, _, text| written(text, Hand::Exponents));
-    liberty "many-digits" ["JSON-06"] "Writes its coordinates with all the digits it computes."
-        => plain().writes(|_, _, text| written(text, Hand::ManyDigits));
-    liberty "states-retained" ["MQTT-07", "STATE-01"] "It publishes its states with the retain flag."
+    tolerance "text-escaped" ["JSON-03"] "Escapes letters in its texts that need it not."
+        => plain().writes(|_, _, _, text| written(text, Hand::Escaped));
+    tolerance "exponents" ["JSON-06"] "Writes its coordinates with an exponent."
+        => plain().writes(|_, _, _, text| written(text, Hand::Exponents));
+    tolerance "many-digits" ["JSON-06"] "Writes its coordinates with all the digits it computes."
+        => plain().writes(|_, _, _, text| written(text, Hand::ManyDigits));
+    tolerance "states-retained" ["MQTT-07", "STATE-01"] "It publishes its states with the retain flag."
         => sending(|_, outgoing| outgoing.retain |= outgoing.name == "state");
-    liberty "header-id-wraps" ["HDR-02"] "It starts its headerIds a little below 4294967295 and goes on with 0 behind it."
+    tolerance "header-id-wraps" ["HDR-02"] "It starts its headerIds a little below 4294967295 and goes on with 0 behind it."
         => header(|_, _, m| begin_at(m, u32::MAX - 12));
-    liberty "header-id-starts-high" ["HDR-02"] "Its headerIds begin at 70000 on every topic."
+    tolerance "header-id-starts-high" ["HDR-02"] "Its headerIds begin at 70000 on every topic."
         => header(|_, _, m| begin_at(m, 70_000));
-    liberty "clock-ahead" ["HDR-03"] "Its clock is one and a half seconds ahead."
+    tolerance "clock-ahead" ["HDR-03"] "Its clock is one and a half seconds ahead."
         => header(|agv, _, m| {
             let ahead = agv.now.utc.checked_add(jiff::SignedDuration::from_millis(1_500));
             m.set("timestamp", format!("{:.2}", ahead.unwrap_or(agv.now.utc)));
         });
-    liberty "seconds-whole" ["HDR-03"] "Gives its timestamps in whole seconds."
+    tolerance "seconds-whole" ["HDR-03"] "Gives its timestamps in whole seconds."
         => header(|agv, _, m| m.set("timestamp", format!("{:.0}", agv.now.utc)));
-    liberty "seconds-fine" ["HDR-03"] "Gives its timestamps with six digits."
+    tolerance "seconds-fine" ["HDR-03"] "Gives its timestamps with six digits."
         => header(|agv, _, m| m.set("timestamp", format!("{:.6}", agv.now.utc)));
 }
 

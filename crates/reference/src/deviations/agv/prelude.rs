@@ -1,46 +1,115 @@
-//! What records are made of: shapes that most deviations have. The others say what they do at each point of the seam
-//! ([`Hooks`]).
+//! What records of the vehicle are made of: the words of its hook points, and the shapes that most deviations have.
 
-use std::time::Duration;
+pub(super) use std::collections::{BTreeMap, BTreeSet, VecDeque};
+pub(super) use std::time::Duration;
 
-use serde_json::{Value, json};
+pub(super) use serde_json::{Value, json};
 
-pub(super) use super::memory::{Hooks, Object, holding, keep, plain};
-use super::memory::{Worded, worded};
+pub(super) use crate::agv::action_effect::{Outcome, Problem};
+pub(super) use crate::agv::action_kinds::Effect;
+pub(super) use crate::agv::actions::{Action, Origin, Status};
+pub(super) use crate::agv::errors::{ActiveError, Life};
+pub(super) use crate::agv::hooks::{
+    Adoption, Cause, Course, Deviation, Event, Head, Hindrance, Hooks, Lack, Leg, Object, Objection, Outgoing, Part,
+    Permission, Relation, Span,
+};
+pub(super) use crate::agv::order_message::{Edge, Order};
+pub(super) use crate::agv::order_state::Stop;
+pub(super) use crate::agv::rejection::{Refusal, Rule};
+pub(super) use crate::agv::{Agv, AgvConfig};
+pub(super) use crate::deviations::json_edit::JsonEdit;
+pub(super) use crate::deviations::record::Record;
+pub(super) use tck_base::clock::Moment;
 
 use crate::ConnectOptions;
-use crate::agv::Agv;
-use crate::agv::action_kinds::Deed;
-use crate::agv::actions::{Action, Status};
-use crate::agv::book::Stop;
-use crate::agv::deeds::Outcome;
-use crate::agv::errors::ActiveError;
-use crate::agv::order_message::{Edge, Order};
-use crate::agv::rejection::{Refusal, Rule};
-use crate::agv::seam::{
-    Cause, Course, Deviation, Event, Head, Hindrance, Leg, Objection, Outgoing, Permission, Relation, Span,
-};
-use crate::deviations::words::Words;
+use crate::hooks::Memory;
 
-macro_rules! parts {
-    ($($name:ident $part:ident: $type:ty, $what:literal;)+) => {
-        $(#[doc = $what] pub(super) fn $name(change: $type) -> Box<Hooks<()>> {
-            worded(Worded::$part(change))
+/// One that remembers this.
+pub(super) fn holding<M>(memory: M) -> Box<Hooks<M>> {
+    Hooks::new(Memory::One(memory))
+}
+
+/// One that remembers something.
+pub(super) fn keep<M: Default>() -> Box<Hooks<M>> {
+    holding(M::default())
+}
+
+/// One that remembers nothing.
+pub(super) fn plain() -> Box<Hooks<()>> {
+    keep()
+}
+
+type Wording = fn(&Agv, &mut Object);
+
+macro_rules! wordings {
+    ($($(#[$doc:meta])* $name:ident $part:ident;)+) => {
+        $($(#[$doc])* pub(super) fn $name(change: Wording) -> Box<Hooks<Wording>> {
+            holding(change).says(|change, agv, part, words| {
+                if let Part::$part = part {
+                    change(agv, words);
+                }
+                true
+            })
         })+
     };
 }
 
-parts! {
-    state State: fn(&Agv, &mut Object), "Words its state otherwise.";
-    position Position: fn(&Agv, &mut Object), "Words its position otherwise, in states and visualizations.";
-    velocity Velocity: fn(&Agv, &mut Object), "Words its velocity otherwise, in states and visualizations.";
-    visualization Visualization: fn(&Agv, &mut Object), "Words its visualization otherwise.";
-    factsheet Factsheet: fn(&Agv, &mut Object), "Words its factsheet otherwise.";
-    node Node: fn(&Agv, &Stop, &mut Object) -> bool, "Words a node state otherwise, or leaves it out.";
-    edge Edge: fn(&Agv, &Edge, &mut Object) -> bool, "Words an edge state otherwise, or leaves it out.";
-    route Route: fn(&Agv, u32, &mut Object) -> bool, "The same for nodes and edges, told by their sequenceId.";
-    action Action: fn(&Agv, &Action, &mut Object) -> bool, "Words an action state otherwise, or leaves it out.";
-    error Error: fn(&Agv, &ActiveError, &mut Object), "Words an error otherwise.";
+wordings! {
+    /// Words its state otherwise.
+    state State;
+    /// Words its position otherwise, in states and visualizations.
+    position Position;
+    /// Words its velocity otherwise, in states and visualizations.
+    velocity Velocity;
+    /// Words its visualization otherwise.
+    visualization Visualization;
+    /// Words its factsheet otherwise.
+    factsheet Factsheet;
+}
+
+type Listing<T> = fn(&Agv, &T, &mut Object) -> bool;
+
+macro_rules! listings {
+    ($($(#[$doc:meta])* $name:ident $part:ident $type:ty;)+) => {
+        $($(#[$doc])* pub(super) fn $name(change: Listing<$type>) -> Box<Hooks<Listing<$type>>> {
+            holding(change).says(|change, agv, part, words| match part {
+                Part::$part(one) => change(agv, one, words),
+                _ => true,
+            })
+        })+
+    };
+}
+
+listings! {
+    /// Words a node state otherwise, or leaves it out.
+    node Node Stop;
+    /// Words an edge state otherwise, or leaves it out.
+    edge Edge Edge;
+    /// Words an action state otherwise, or leaves it out.
+    action Action Action;
+}
+
+type Sequenced = fn(&Agv, u32, &mut Object) -> bool;
+
+/// Words a node state or an edge state otherwise, told by its sequenceId, or leaves it out.
+pub(super) fn route(change: Sequenced) -> Box<Hooks<Sequenced>> {
+    holding(change).says(|change, agv, part, words| match part {
+        Part::Node(stop) => change(agv, stop.node.sequence_id, words),
+        Part::Edge(edge) => change(agv, edge.sequence_id, words),
+        _ => true,
+    })
+}
+
+type WordingError = fn(&Agv, &ActiveError, &mut Object);
+
+/// Words an error otherwise.
+pub(super) fn error(change: WordingError) -> Box<Hooks<WordingError>> {
+    holding(change).says(|change, agv, part, words| {
+        if let Part::Error(error) = part {
+            change(agv, error, words);
+        }
+        true
+    })
 }
 
 /// Words the header otherwise, of the message of a topic name.
@@ -48,25 +117,23 @@ pub(super) fn header(change: fn(&mut Agv, Head, &mut Object)) -> Box<Hooks<fn(&m
     holding(change).heads(|change, agv, head, header| change(agv, head, header))
 }
 
+type Joining = fn(&Agv, &mut ConnectOptions);
+
 /// Connects otherwise.
-pub(super) fn joining(change: fn(&Agv, &mut ConnectOptions)) -> Box<Hooks<()>> {
-    plain().joins(change)
+pub(super) fn joining(change: Joining) -> Box<Hooks<Joining>> {
+    holding(change).connects(|change, agv, options| change(agv, options))
 }
 
 /// Words its last will otherwise.
-pub(super) fn will(change: fn(&mut Object)) -> Box<dyn Deviation> {
-    struct Will(fn(&mut Object));
-    impl Deviation for Will {
-        fn joins(&mut self, _: &Agv, options: &mut ConnectOptions) {
-            if let Some(will) = &mut options.will
-                && let Ok(mut words) = serde_json::from_slice(&will.payload)
-            {
-                (self.0)(&mut words);
-                will.payload = Value::Object(words).to_string().into_bytes();
-            }
+pub(super) fn will(change: fn(&mut Object)) -> Box<Hooks<fn(&mut Object)>> {
+    holding(change).connects(|change, _, options| {
+        if let Some(will) = &mut options.will
+            && let Ok(mut words) = serde_json::from_slice(&will.payload)
+        {
+            change(&mut words);
+            will.payload = Value::Object(words).to_string().into_bytes();
         }
-    }
-    Box::new(Will(change))
+    })
 }
 
 /// Sends the messages of a topic otherwise.
@@ -86,16 +153,12 @@ pub(super) fn unsaid(which: fn(&Agv, &str, &Object) -> bool) -> Box<Hooks<fn(&Ag
 }
 
 /// Reads an order otherwise.
-pub(super) fn reading(change: fn(&Agv, &mut Object)) -> Box<dyn Deviation> {
-    struct Reading(fn(&Agv, &mut Object));
-    impl Deviation for Reading {
-        fn reads(&self, agv: &Agv, message: &mut Value) {
-            if let Value::Object(order) = message {
-                (self.0)(agv, order);
-            }
+pub(super) fn reading(change: Wording) -> Box<Hooks<Wording>> {
+    holding(change).reads(|change, agv, message| {
+        if let Value::Object(order) = message {
+            change(agv, order);
         }
-    }
-    Box::new(Reading(change))
+    })
 }
 
 type Refused = fn(&mut Agv, &Value, Rule);
@@ -135,32 +198,32 @@ pub(super) fn failure(change: Failure) -> Box<Hooks<Failure>> {
     })
 }
 
-type Instead = (Deed, fn(&mut Agv, &Action) -> Option<Outcome>);
+type Instead = (Effect, fn(&mut Agv, &Action) -> Option<Outcome>);
 
 /// Does something else than an action asks for.
-pub(super) fn instead(deed: Deed, then: fn(&mut Agv, &Action) -> Option<Outcome>) -> Box<Hooks<Instead>> {
-    holding((deed, then)).does(|(deed, then), agv, action| match is(action, *deed) {
+pub(super) fn instead(effect: Effect, then: fn(&mut Agv, &Action) -> Option<Outcome>) -> Box<Hooks<Instead>> {
+    holding((effect, then)).does(|(effect, then), agv, action| match is(action, *effect) {
         true => then(agv, action),
         false => None,
     })
 }
 
-type After = (Deed, fn(&mut Agv, &Action, Outcome) -> Outcome);
+type After = (Effect, fn(&mut Agv, &Action, Outcome) -> Outcome);
 
 /// Makes something else of what came of an action.
-pub(super) fn after(deed: Deed, then: fn(&mut Agv, &Action, Outcome) -> Outcome) -> Box<Hooks<After>> {
-    holding((deed, then)).ends(|(deed, then), agv, action, outcome| match is(action, *deed) {
+pub(super) fn after(effect: Effect, then: fn(&mut Agv, &Action, Outcome) -> Outcome) -> Box<Hooks<After>> {
+    holding((effect, then)).ends(|(effect, then), agv, action, outcome| match is(action, *effect) {
         true => then(agv, action, outcome),
         false => outcome,
     })
 }
 
-type Changing = (Deed, fn(&mut Agv, &Action));
+type Changing = (Effect, fn(&mut Agv, &Action));
 
 /// Changes something when an action has succeeded.
-pub(super) fn succeeded(deed: Deed, then: fn(&mut Agv, &Action)) -> Box<Hooks<Changing>> {
-    holding((deed, then)).ends(|(deed, then), agv, action, outcome| {
-        if is(action, *deed) && matches!(outcome, Outcome::Done(_)) {
+pub(super) fn succeeded(effect: Effect, then: fn(&mut Agv, &Action)) -> Box<Hooks<Changing>> {
+    holding((effect, then)).ends(|(effect, then), agv, action, outcome| {
+        if is(action, *effect) && matches!(outcome, Outcome::Done(_)) {
             then(agv, action);
         }
         outcome
@@ -168,9 +231,9 @@ pub(super) fn succeeded(deed: Deed, then: fn(&mut Agv, &Action)) -> Box<Hooks<Ch
 }
 
 /// Changes something when an action has failed.
-pub(super) fn failed(deed: Deed, then: fn(&mut Agv, &Action)) -> Box<Hooks<Changing>> {
-    holding((deed, then)).ends(|(deed, then), agv, action, outcome| {
-        if is(action, *deed) && matches!(outcome, Outcome::Failed(_)) {
+pub(super) fn failed(effect: Effect, then: fn(&mut Agv, &Action)) -> Box<Hooks<Changing>> {
+    holding((effect, then)).ends(|(effect, then), agv, action, outcome| {
+        if is(action, *effect) && matches!(outcome, Outcome::Failed(_)) {
             then(agv, action);
         }
         outcome
@@ -178,16 +241,16 @@ pub(super) fn failed(deed: Deed, then: fn(&mut Agv, &Action)) -> Box<Hooks<Chang
 }
 
 /// Says FINISHED of an action that has failed.
-pub(super) fn fails_unseen(deed: Deed) -> Box<Hooks<After>> {
-    after(deed, |_, _, outcome| match outcome {
+pub(super) fn fails_unseen(effect: Effect) -> Box<Hooks<After>> {
+    after(effect, |_, _, outcome| match outcome {
         Outcome::Failed(_) => Outcome::Done(None),
         other => other,
     })
 }
 
 /// Whether the action is of that kind.
-pub(super) fn is(action: &Action, deed: Deed) -> bool {
-    action.kind.is_some_and(|kind| kind.deed == deed)
+pub(super) fn is(action: &Action, effect: Effect) -> bool {
+    action.kind.is_some_and(|kind| kind.effect == effect)
 }
 
 /// Does something when something happens.
@@ -342,7 +405,7 @@ pub(super) fn linger(agv: &mut Agv, millis: u64) {
 
 /// Whether its base leads on to another node.
 pub(super) fn goes_on(agv: &Agv) -> bool {
-    agv.book.nodes.front().is_some_and(|next| next.node.released)
+    agv.order.nodes.front().is_some_and(|next| next.node.released)
 }
 
 /// Whether an action of the order is under way.
@@ -356,17 +419,13 @@ pub(super) fn lifts_pause(agv: &Agv) -> bool {
 }
 
 /// Takes as long as no good vehicle does from one state to the next, while something is so.
-pub(super) fn silent(while_so: fn(&Agv) -> bool) -> Box<dyn Deviation> {
-    struct Silent(fn(&Agv) -> bool);
-    impl Deviation for Silent {
-        fn lasts(&self, agv: &Agv, what: Span<'_>, usual: Duration) -> Duration {
-            match matches!(what, Span::BetweenStates) && (self.0)(agv) {
-                true => Duration::from_secs(45),
-                false => usual,
-            }
-        }
-    }
-    Box::new(Silent(while_so))
+pub(super) fn silent(while_so: fn(&Agv) -> bool) -> Box<Hooks<fn(&Agv) -> bool>> {
+    holding(while_so).lasts(
+        |while_so, agv, what, usual| match matches!(what, Span::BetweenStates) && while_so(agv) {
+            true => Duration::from_secs(45),
+            false => usual,
+        },
+    )
 }
 
 /// Changes a number that is there.
@@ -394,5 +453,5 @@ pub(super) fn replace(text: &mut Vec<u8>, from: &[u8], to: &[u8]) {
 
 /// Whether nothing of the order is left to be driven or done.
 pub(super) fn is_done(agv: &Agv) -> bool {
-    agv.book.nodes.is_empty() && !agv.actions.order_unfinished()
+    agv.order.nodes.is_empty() && !agv.actions.order_unfinished()
 }
