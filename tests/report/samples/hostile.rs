@@ -129,6 +129,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
             not_applicable: verdict.is_none().then(evil),
             seconds: f64::MAX,
             reason: Some(evil()),
+            cause: None,
             maturity: "watchlist".to_owned(),
             maturity_note: Some(evil()),
             journal: Some((first, last)),
@@ -170,6 +171,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
         protocol: evil(),
         partial: true,
         partial_reason: Some(evil()),
+            cause: None,
         device: DeviceIdentity {
             manufacturer: evil(),
             serial_number: evil(),
