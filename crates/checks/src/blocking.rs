@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, text};
+use tck_view::StateView;
 use tck_world::{Blocking, Fact, Listen, Observation, OrdersSent, Placed, SentOrder, Topic};
 
 /// How many actions of one state are looked at, and how many findings are remembered.
@@ -28,7 +28,7 @@ pub(super) const BLOCKING: Check = Check {
     arguments: &["still"],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Shown, Fact::Orders],
-    needs: &[],
+    needs: &[StateView::action_states, StateView::order_id],
     start: |_| Box::new(BlockingTypes::default()),
 };
 
@@ -96,7 +96,7 @@ impl Running for BlockingTypes {
                 self.pair(first, second, seq, &mut found);
             }
         }
-        if state.get("driving").and_then(Value::as_bool) == Some(true) {
+        if state.driving.is(true) {
             let still = context.with.get("still").and_then(Value::as_str);
             for action in listed.iter().filter(|action| action.runs()) {
                 self.moving(action, still, seq, &mut found);
@@ -109,14 +109,14 @@ impl Running for BlockingTypes {
 
 impl BlockingTypes {
     /// The actions of nodes whose list is known.
-    fn listed<'s>(state: &'s Value, orders: &OrdersSent) -> Vec<Listed<'s>> {
-        let order = text(state, "orderId");
+    fn listed<'s>(state: &'s StateView, orders: &OrdersSent) -> Vec<Listed<'s>> {
+        let order = state.order_id.or_empty();
         if orders.of(order).any(|sent| !sent.sound) {
             return Vec::new();
         }
-        let all = elements(state, "actionStates").take(ACTIONS);
+        let all = state.action_states.iter().take(ACTIONS);
         all.filter_map(|action| {
-            let id = text(action, "actionId");
+            let id = action.action_id.or_empty();
             let mut places = orders.of(order).filter_map(|sent| {
                 let here = sent.actions.iter().find(|placed| placed.action == id);
                 here.map(|placed| (placed, sent))
@@ -142,7 +142,7 @@ impl BlockingTypes {
                 .filter(|other| other.blocking == Some(Blocking::Hard));
             Some(Listed {
                 id,
-                status: text(action, "actionStatus"),
+                status: action.action_status.or_empty(),
                 kind: placed.kind.clone(),
                 blocking,
                 sequence: placed.sequence,

@@ -4,13 +4,11 @@
 
 use std::collections::BTreeMap;
 
-use serde_json::Value;
-
 use crate::finding::{broken, quote};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{actions, elements, number, text};
-use tck_world::{Fact, Listen, Observation, Topic, read_elements};
+use tck_view::StateView;
+use tck_world::{Fact, Listen, Observation, Topic, nodes_left};
 
 /// How many cancellations and actions are looked at.
 const MANY: usize = 256;
@@ -33,7 +31,7 @@ pub(super) const COURSE: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
-    needs: &[],
+    needs: &[StateView::action_states, StateView::last_node_sequence_id],
     start: |_| Box::new(Course::default()),
 };
 
@@ -60,23 +58,23 @@ impl Course {
             self.begun.clear();
             self.sent.retain(|_, (cancels, _)| !*cancels);
         }
-        let Some(message) = record.to_vehicle_json(Topic::InstantActions) else {
+        let Some(message) = record.instant_actions_to_vehicle() else {
             return;
         };
-        for action in actions(message).take(MANY) {
+        for action in message.all_actions().take(MANY) {
             if self.sent.len() >= MANY {
                 self.sent.pop_first();
             }
-            let id = text(action, "actionId").chars().take(512).collect();
+            let id = action.action_id.or_empty().to_owned();
             self.sent
-                .insert(id, (text(action, "actionType") == "cancelOrder", record.seq()));
+                .insert(id, (action.action_type.is("cancelOrder"), record.seq()));
         }
     }
 
     /// Whether an action of the order is under way.
-    fn works(&self, state: &Value) -> bool {
-        let mut all = elements(state, "actionStates").take(MANY);
-        all.any(|action| text(action, "actionStatus") == "RUNNING" && !self.sent.contains_key(text(action, "actionId")))
+    fn works(&self, state: &StateView) -> bool {
+        let mut all = state.action_states.iter().take(MANY);
+        all.any(|action| action.action_status.is("RUNNING") && !self.sent.contains_key(action.action_id.or_empty()))
     }
 }
 
@@ -95,20 +93,20 @@ impl Running for Course {
         if !self.sent.values().any(|(cancels, _)| *cancels) {
             return false;
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
-        let Some(last) = number(state, "lastNodeSequenceId") else {
+        let Some(last) = state.last_node_sequence_id.whole() else {
             return false;
         };
-        let order = text(state, "orderId");
+        let order = state.order_id.or_empty();
         let works = self.works(state);
         let now = record.at().moment;
         let patience = context.time.notice;
         let mut judged = false;
-        for action in elements(state, "actionStates").take(MANY) {
-            let id = text(action, "actionId");
-            let status = text(action, "actionStatus");
+        for action in state.action_states.iter().take(MANY) {
+            let id = action.action_id.or_empty();
+            let status = action.action_status.or_empty();
             let Some((true, seq)) = self.sent.get(id).copied() else {
                 continue;
             };
@@ -119,7 +117,7 @@ impl Running for Course {
             }
             judged = true;
             let begun = self.begun.entry(id.to_owned()).or_insert_with(|| Begun {
-                order: order.chars().take(512).collect(),
+                order: order.to_owned(),
                 farthest: next_node(state, last),
                 waits: None,
                 told: false,
@@ -143,9 +141,9 @@ impl Running for Course {
             }
             let since = *begun.waits.get_or_insert(now);
             // Who has done what was asked for later has read the cancellation long ago.
-            let later = elements(state, "actionStates").take(MANY).any(|other| {
-                let asked = self.sent.get(text(other, "actionId"));
-                text(other, "actionStatus") == "FINISHED" && asked.is_some_and(|(_, at)| *at > seq)
+            let later = state.action_states.iter().take(MANY).any(|other| {
+                let asked = self.sent.get(other.action_id.or_empty());
+                other.action_status.is("FINISHED") && asked.is_some_and(|(_, at)| *at > seq)
             });
             if later || now.since(since) > patience {
                 begun.told = true;
@@ -161,8 +159,8 @@ impl Running for Course {
 }
 
 /// The first node behind the last one; without a list of nodes, the next by number.
-fn next_node(state: &Value, last: u64) -> u64 {
-    let nodes = read_elements(state, "nodeStates", "nodeId").unwrap_or_default();
+fn next_node(state: &StateView, last: u64) -> u64 {
+    let nodes = nodes_left(state).unwrap_or_default();
     let ahead = nodes.iter().map(|node| node.sequence).filter(|number| *number > last);
     ahead.min().unwrap_or(last + 2).max(last + 2)
 }

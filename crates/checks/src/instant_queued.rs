@@ -8,7 +8,7 @@ use std::time::Duration;
 use crate::finding::{broken, quote, remark};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{actions, elements, text};
+use tck_view::StateView;
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// How many actions are kept in mind, and how many of a state are looked at.
@@ -34,7 +34,7 @@ pub(super) const NOT_QUEUED: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
-    needs: &[],
+    needs: &[StateView::action_states],
     start: |_| Box::new(NotQueued::default()),
 };
 
@@ -56,11 +56,11 @@ struct NotQueued {
 
 impl NotQueued {
     fn learn(&mut self, record: &Observation<'_>) {
-        let Some(message) = record.to_vehicle_json(Topic::InstantActions) else {
+        let Some(message) = record.instant_actions_to_vehicle() else {
             return;
         };
-        for action in actions(message).take(ACTIONS) {
-            let kind = text(action, "actionType");
+        for action in message.all_actions().take(ACTIONS) {
+            let kind = action.action_type.or_empty();
             if !matches!(kind, "stateRequest" | "factsheetRequest" | "logReport") {
                 continue;
             }
@@ -74,8 +74,7 @@ impl NotQueued {
                 states: 0,
                 others: BTreeSet::new(),
             };
-            self.asked
-                .insert(text(action, "actionId").chars().take(512).collect(), asked);
+            self.asked.insert(action.action_id.or_empty().to_owned(), asked);
         }
     }
 }
@@ -95,13 +94,15 @@ impl Running for NotQueued {
         if self.asked.is_empty() {
             return false;
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
         let now = record.at().moment;
-        let statuses: BTreeMap<&str, &str> = elements(state, "actionStates")
+        let statuses: BTreeMap<&str, &str> = state
+            .action_states
+            .iter()
             .take(ACTIONS)
-            .map(|action| (text(action, "actionId"), text(action, "actionStatus")))
+            .map(|action| (action.action_id.or_empty(), action.action_status.or_empty()))
             .collect();
         let active = |status: &str| matches!(status, "INITIALIZING" | "RUNNING" | "PAUSED");
         let mut judged = false;

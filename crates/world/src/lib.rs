@@ -37,7 +37,7 @@ pub use listen::{Kind, Listen, Listens, Seen};
 pub use malformed::MalformedOrders;
 pub use mock::{MockVehicle, Outside, ShownState};
 pub use observation::{Delivered, DevicePublish, End, Link, Observation, Observer};
-pub use orders::{Blocking, Element, OrdersSent, Placed, SentOrder, read_elements, sets_position};
+pub use orders::{Blocking, Element, OrdersSent, Placed, SentOrder, edges_left, nodes_left, sets_position};
 pub use pose::Pose;
 pub use restarts::Restarts;
 pub use setting::Setting;

@@ -4,12 +4,8 @@
 
 use std::collections::VecDeque;
 
-use serde_json::Value;
-use tck_base::pattern::whole;
-
-use crate::members::{elements, number, text};
 use crate::observation::Observation;
-use tck_view::Topic;
+use tck_view::{ActionView, List, Member, Number, OrderView, StateView, Text};
 
 /// How many order messages are kept, and how many elements each may have.
 const MESSAGES: usize = 64;
@@ -27,24 +23,29 @@ pub struct Element {
 }
 
 impl Element {
-    fn read(value: &Value, id: &str) -> Option<Self> {
-        let id = value.get(id)?.as_str()?;
-        let number = value.get("sequenceId")?;
+    fn read(id: &Member<Text>, sequence: &Member<Number>, released: &Member<bool>) -> Option<Self> {
         Some(Self {
-            id: id.chars().take(512).collect(),
-            sequence: whole(number)?,
-            released: value.get("released")?.as_bool()?,
+            id: id.text()?.to_owned(),
+            sequence: sequence.whole()?,
+            released: released.flag()?,
         })
     }
 }
 
-/// The elements of `list`; `None` when it is missing, too long, or one of them cannot be read.
-pub fn read_elements(message: &Value, list: &str, id: &str) -> Option<Vec<Element>> {
-    let all = message.get(list)?.as_array()?;
-    if all.len() > ELEMENTS {
-        return None;
-    }
-    all.iter().map(|value| Element::read(value, id)).collect()
+/// The nodes a state still lists; `None` when the list is missing, too long, or one of them cannot be read.
+#[must_use]
+pub fn nodes_left(state: &StateView) -> Option<Vec<Element>> {
+    let all = state.node_states.complete()?.iter();
+    all.map(|node| Element::read(&node.node_id, &node.sequence_id, &node.released))
+        .collect()
+}
+
+/// The edges a state still lists; `None` when the list is missing, too long, or one of them cannot be read.
+#[must_use]
+pub fn edges_left(state: &StateView) -> Option<Vec<Element>> {
+    let all = state.edge_states.complete()?.iter();
+    all.map(|edge| Element::read(&edge.edge_id, &edge.sequence_id, &edge.released))
+        .collect()
 }
 
 /// What an action may run beside: blockingType.
@@ -59,8 +60,8 @@ pub enum Blocking {
 }
 
 impl Blocking {
-    fn read(action: &Value) -> Option<Self> {
-        match text(action, "blockingType") {
+    fn read(action: &ActionView) -> Option<Self> {
+        match action.blocking_type.or_empty() {
             "NONE" => Some(Self::None),
             "SOFT" => Some(Self::Soft),
             "HARD" => Some(Self::Hard),
@@ -84,21 +85,22 @@ pub struct Placed {
     pub on_edge: bool,
 }
 
-/// The actions of all elements of `list`, bounded.
-fn placed(message: &Value, list: &str, on_edge: bool) -> Vec<Placed> {
-    let of_element = |element| {
-        let sequence = number(element, "sequenceId");
-        elements(element, "actions").filter_map(move |action| {
-            Some(Placed {
-                action: action.get("actionId")?.as_str()?.chars().take(512).collect(),
-                kind: text(action, "actionType").chars().take(512).collect(),
-                blocking: Blocking::read(action),
-                sequence: sequence?,
-                on_edge,
-            })
+/// The actions of an element.
+fn placed<'o>(
+    actions: &'o Member<List<ActionView>>,
+    sequence: &Member<Number>,
+    on_edge: bool,
+) -> impl Iterator<Item = Placed> + use<'o> {
+    let sequence = sequence.whole();
+    actions.iter().filter_map(move |action| {
+        Some(Placed {
+            action: action.action_id.text()?.to_owned(),
+            kind: action.action_type.or_empty().to_owned(),
+            blocking: Blocking::read(action),
+            sequence: sequence?,
+            on_edge,
         })
-    };
-    elements(message, list).flat_map(of_element).take(ELEMENTS).collect()
+    })
 }
 
 /// Whether an action of this type gives the vehicle a pose and a last node; later versions spell it out.
@@ -126,22 +128,36 @@ pub struct SentOrder {
 }
 
 impl SentOrder {
-    fn read(message: &Value) -> Option<Self> {
-        let order = message.get("orderId")?.as_str()?;
-        let update = number(message, "orderUpdateId")?;
-        let nodes = read_elements(message, "nodes", "nodeId");
-        let edges = read_elements(message, "edges", "edgeId");
+    fn read(message: &OrderView) -> Option<Self> {
+        let order = message.order_id.text()?;
+        let update = message.order_update_id.whole()?;
+        let nodes: Option<Vec<Element>> = message.nodes.complete().and_then(|nodes| {
+            let all = nodes.iter();
+            all.map(|node| Element::read(&node.node_id, &node.sequence_id, &node.released))
+                .collect()
+        });
+        let edges: Option<Vec<Element>> = message.edges.complete().and_then(|edges| {
+            let all = edges.iter();
+            all.map(|edge| Element::read(&edge.edge_id, &edge.sequence_id, &edge.released))
+                .collect()
+        });
+        let of_nodes = message.nodes.iter();
+        let of_nodes = of_nodes.flat_map(|node| placed(&node.actions, &node.sequence_id, false));
+        let of_edges = message.edges.iter();
+        let of_edges = of_edges.flat_map(|edge| placed(&edge.actions, &edge.sequence_id, true));
         let sound = nodes.is_some() && edges.is_some();
         let mut sent = Self {
-            order: order.chars().take(512).collect(),
+            order: order.to_owned(),
             update,
             nodes: nodes.unwrap_or_default(),
             edges: edges.unwrap_or_default(),
-            actions: [placed(message, "nodes", false), placed(message, "edges", true)].concat(),
-            places: elements(message, "nodes")
-                .flat_map(|node| elements(node, "actions"))
+            actions: of_nodes.take(ELEMENTS).chain(of_edges.take(ELEMENTS)).collect(),
+            places: message
+                .nodes
+                .iter()
+                .flat_map(|node| node.actions.iter())
                 .take(ELEMENTS)
-                .any(|action| sets_position(text(action, "actionType"))),
+                .any(|action| sets_position(action.action_type.or_empty())),
             sound,
         };
         sent.sound &= sent.is_chain();
@@ -198,7 +214,7 @@ impl OrdersSent {
 impl OrdersSent {
     /// Learns from the next record.
     pub(crate) fn learn(&mut self, record: &Observation<'_>) {
-        let Some(sent) = record.to_vehicle_json(Topic::Order).and_then(SentOrder::read) else {
+        let Some(sent) = record.order_to_vehicle().and_then(|order| SentOrder::read(order)) else {
             return;
         };
         self.at = Some(record.seq());

@@ -1,12 +1,16 @@
 //! Where a state shows the vehicle.
 
 use serde_json::Value;
-
-use crate::members::kept;
+use tck_view::{Member, Number, StateView};
 
 /// A number member that can be calculated with.
 pub(crate) fn finite(value: &Value, name: &str) -> Option<f64> {
     value.get(name)?.as_f64().filter(|number| number.abs() < 1e9)
+}
+
+/// A number that can be calculated with.
+pub(crate) fn sane(member: &Member<Number>) -> Option<f64> {
+    member.float().filter(|number| number.abs() < 1e9)
 }
 
 /// agvPosition, where it is initialized and complete.
@@ -25,15 +29,16 @@ pub struct Pose {
 impl Pose {
     /// Of a state.
     #[must_use]
-    pub fn read(state: &Value) -> Option<Self> {
-        let position = state.get("agvPosition")?;
-        let initialized = position.get("positionInitialized").and_then(Value::as_bool);
-        (initialized == Some(true)).then_some(())?;
+    pub fn read(state: &StateView) -> Option<Self> {
+        let position = state
+            .position
+            .there()
+            .filter(|position| position.initialized.is(true))?;
         Some(Self {
-            map: kept(position, "mapId"),
-            x: finite(position, "x")?,
-            y: finite(position, "y")?,
-            theta: finite(position, "theta").filter(|theta| theta.abs() < 3.2)?,
+            map: position.map_id.or_empty().to_owned(),
+            x: sane(&position.x)?,
+            y: sane(&position.y)?,
+            theta: sane(&position.theta).filter(|theta| theta.abs() < 3.2)?,
         })
     }
 }

@@ -1,11 +1,13 @@
 //! The order a vehicle shows in its states, and whether it can still be held against it.
 
+use std::sync::Arc;
+
 use serde_json::Value;
 
 use crate::members::{actions, elements, number, text};
 use crate::observation::Observation;
 use crate::orders::sets_position;
-use tck_view::Topic;
+use tck_view::{StateView, Topic};
 
 /// How many FATAL errors are kept in mind.
 const ERRORS: usize = 16;
@@ -32,8 +34,8 @@ pub struct ShownOrder {
 impl ShownOrder {
     /// The state that this record is, if it can be held against its order.
     #[must_use]
-    pub fn state<'e>(&self, record: &Observation<'e>) -> Option<&'e Value> {
-        record.state_json().filter(|_| self.held == Some(record.seq()))
+    pub fn state<'e>(&self, record: &Observation<'e>) -> Option<&'e Arc<StateView>> {
+        record.state().filter(|_| self.held == Some(record.seq()))
     }
 
     /// orderId of the last state.

@@ -8,12 +8,12 @@ use serde_json::Value;
 use tck_base::clock::Moment;
 
 use crate::lane::{Demands, Lane, OrderedNode};
-use crate::members::{elements, kept, number, text};
+use crate::members::{elements, kept, number};
 use crate::observation::Observation;
-use crate::orders::{Element, OrdersSent, read_elements};
-use crate::pose::{Pose, finite};
+use crate::orders::{Element, OrdersSent, edges_left, nodes_left};
+use crate::pose::{Pose, sane};
 use crate::shown::ShownOrder;
-use tck_view::Topic;
+use tck_view::{StateView, Topic};
 
 /// How many order messages are kept, and how many elements of each.
 const MESSAGES: usize = 64;
@@ -34,13 +34,12 @@ pub struct Velocity {
 }
 
 impl Velocity {
-    fn read(state: &Value) -> Self {
-        let member = |name| state.get("velocity").and_then(|velocity| finite(velocity, name));
-        Self {
-            vx: member("vx"),
-            vy: member("vy"),
-            omega: member("omega"),
-        }
+    fn read(state: &StateView) -> Self {
+        state.velocity.there().map_or_else(Self::default, |velocity| Self {
+            vx: sane(&velocity.vx),
+            vy: sane(&velocity.vy),
+            omega: sane(&velocity.omega),
+        })
     }
 
     /// Metres per second, whatever the direction.
@@ -174,7 +173,7 @@ impl Way {
             self.plans.push_back(plan);
         }
         let state = shown.state(record);
-        let is_state = record.state_json().is_some();
+        let is_state = record.state().is_some();
         // Messages that the harness holds up tell nothing about time.
         if record.link.disturbed || !is_state {
             if is_state || record.link.disturbed {
@@ -203,9 +202,15 @@ impl Way {
         Some(Arc::clone(step))
     }
 
-    fn view(&self, record: &Observation<'_>, state: &Value, shown: &ShownOrder, orders: &OrdersSent) -> Option<View> {
-        let order = text(state, "orderId");
-        let update = number(state, "orderUpdateId")?;
+    fn view(
+        &self,
+        record: &Observation<'_>,
+        state: &StateView,
+        shown: &ShownOrder,
+        orders: &OrdersSent,
+    ) -> Option<View> {
+        let order = state.order_id.or_empty();
+        let update = state.order_update_id.whole()?;
         let mut sent = orders.candidates(order, update).peekable();
         sent.peek()?;
         if !sent.all(|sent| sent.sound) {
@@ -218,8 +223,8 @@ impl Way {
         if node.id != *id || (shown.carried().is_some() && !first) {
             return None;
         }
-        let nodes = read_elements(state, "nodeStates", "nodeId")?;
-        let edges = read_elements(state, "edgeStates", "edgeId")?;
+        let nodes = nodes_left(state)?;
+        let edges = edges_left(state)?;
         let on = |list: &[Element], sequence: u64| {
             let found = list.iter().find(|element| element.sequence == sequence);
             found.map(|element| element.released)
@@ -234,15 +239,15 @@ impl Way {
         Some(View {
             seq: record.seq(),
             moment: record.at().moment,
-            stamped: text(state, "timestamp").parse().ok(),
-            order: order.chars().take(512).collect(),
+            stamped: state.header.timestamp.or_empty().parse().ok(),
+            order: order.to_owned(),
             node: node.clone(),
             fresh: true,
             lane,
             ahead,
             pose: Pose::read(state),
             velocity: Velocity::read(state),
-            driving: state.get("driving").and_then(Value::as_bool),
+            driving: state.driving.flag(),
             base_done: !nodes.iter().any(is_ahead),
         })
     }

@@ -11,8 +11,9 @@ use serde_json::Value;
 use crate::finding::{broken, quote};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_view::StateView;
 use tck_world::members::{actions, elements, number, text};
-use tck_world::{Element, Fact, Listen, Observation, Topic, last_node, may_abandon, read_elements};
+use tck_world::{Element, Fact, Listen, Observation, Topic, last_node, may_abandon, nodes_left};
 
 /// How many orders on their way are kept in mind.
 const ORDERS: usize = 1024;
@@ -266,8 +267,8 @@ fn named(message: &Value) -> Option<Pair> {
 }
 
 /// What nodeStates list, if it leads away from the last node: what is listed first may be the node the vehicle is on.
-fn ahead(state: &Value, last: Option<&(String, u64)>) -> Option<Vec<Element>> {
-    let nodes = read_elements(state, "nodeStates", "nodeId")?;
+fn ahead(state: &StateView, last: Option<&(String, u64)>) -> Option<Vec<Element>> {
+    let nodes = nodes_left(state)?;
     let end = nodes.last()?;
     let leads = nodes.len() > 1 || last.is_some_and(|(node, _)| *node != end.id);
     leads.then_some(nodes)
@@ -299,7 +300,7 @@ impl Running for OrderKnown {
         let last = last_node(state);
         let now = Before {
             pair: pair.clone(),
-            ahead: ahead(state, last.as_ref()),
+            ahead: record.state().and_then(|state| ahead(state, last.as_ref())),
             last,
             may_be_over: may_abandon(state),
         };

@@ -2,11 +2,9 @@
 
 use std::collections::{BTreeSet, VecDeque};
 
-use serde_json::Value;
-
 use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, number, text};
+use tck_view::{Member, Node, NodePosition, NodeState, StateView};
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// How many order messages, and nodes of one, are kept in mind.
@@ -24,7 +22,7 @@ pub(crate) const NODE_POSITIONS: Check = Check {
     arguments: &[],
     listens: &[Listen::ToVehicle(Topic::Order), Listen::Delivered(Topic::State)],
     reads: &[Fact::Shown, Fact::Orders],
-    needs: &[],
+    needs: &[StateView::node_states, NodeState::node_position],
     start: |_| Box::new(NodePositions::default()),
 };
 
@@ -38,7 +36,7 @@ pub(crate) const JOINT_POSITION: Check = Check {
     arguments: &[],
     listens: &[Listen::ToVehicle(Topic::Order), Listen::Delivered(Topic::State)],
     reads: &[Fact::Shown, Fact::Orders],
-    needs: &[],
+    needs: &[StateView::node_states, NodeState::node_position],
     start: |_| {
         Box::new(NodePositions {
             joint: true,
@@ -71,11 +69,10 @@ struct NodePositions {
     told: BTreeSet<(String, u64)>,
 }
 
-fn place(node: &Value) -> Option<Place> {
-    let position = node.get("nodePosition")?;
-    let member = |name: &str| position.get(name).and_then(Value::as_f64);
-    let map = text(position, "mapId").chars().take(512).collect();
-    Some((map, member("x")?, member("y")?))
+fn place(position: &Member<Box<NodePosition>>) -> Option<Place> {
+    let position = position.there()?;
+    let map = position.map_id.or_empty().to_owned();
+    Some((map, position.x.float()?, position.y.float()?))
 }
 
 fn same(one: &Place, other: &Place) -> bool {
@@ -84,23 +81,23 @@ fn same(one: &Place, other: &Place) -> bool {
 
 impl NodePositions {
     fn learn(&mut self, record: &Observation<'_>) {
-        let Some(order) = record.to_vehicle_json(Topic::Order) else {
+        let Some(order) = record.order_to_vehicle() else {
             return;
         };
-        let Some(update) = number(order, "orderUpdateId") else {
+        let Some(update) = order.order_update_id.whole() else {
             return;
         };
-        let node = |node: &Value| {
-            let id = text(node, "nodeId").chars().take(512).collect();
-            Some((id, number(node, "sequenceId")?, place(node)?))
+        let node = |node: &Node| {
+            let id = node.node_id.or_empty().to_owned();
+            Some((id, node.sequence_id.whole()?, place(&node.node_position)?))
         };
         if self.plans.len() == MESSAGES {
             self.plans.pop_front();
         }
         self.plans.push_back(Plan {
-            order: text(order, "orderId").chars().take(512).collect(),
+            order: order.order_id.or_empty().to_owned(),
             update,
-            nodes: elements(order, "nodes").take(NODES).filter_map(node).collect(),
+            nodes: order.nodes.iter().take(NODES).filter_map(node).collect(),
         });
     }
 
@@ -129,12 +126,12 @@ impl Running for NodePositions {
         let Some(state) = context.world.shown().state(record) else {
             return false;
         };
-        let Some(update) = number(state, "orderUpdateId") else {
+        let Some(update) = state.order_update_id.whole() else {
             return false;
         };
-        let order = text(state, "orderId");
+        let order = state.order_id.or_empty();
         if self.of != order {
-            self.of = order.chars().take(512).collect();
+            order.clone_into(&mut self.of);
             self.adopted.clear();
             self.told.clear();
         }
@@ -143,11 +140,11 @@ impl Running for NodePositions {
         }
         let sound = context.world.orders().of(order).all(|sent| sent.sound);
         let mut judged = false;
-        for node in elements(state, "nodeStates").take(NODES).filter(|_| sound) {
-            let (Some(shown), Some(sequence)) = (place(node), number(node, "sequenceId")) else {
+        for node in state.node_states.iter().take(NODES).filter(|_| sound) {
+            let (Some(shown), Some(sequence)) = (place(&node.node_position), node.sequence_id.whole()) else {
                 continue;
             };
-            let id = text(node, "nodeId");
+            let id = node.node_id.or_empty();
             let sent = self.sent(id, sequence, update);
             let Some((first, known)) = sent.first().copied() else {
                 continue;

@@ -4,11 +4,9 @@
 
 use std::collections::BTreeSet;
 
-use serde_json::Value;
-
 use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, text};
+use tck_view::{ActionState, MessageView, StateView};
 use tck_world::{Listen, Observation, Seen, Topic};
 
 /// How many actions of a message are looked at.
@@ -25,7 +23,7 @@ pub(crate) const STATUSES: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[],
-    needs: &[],
+    needs: &[StateView::action_states, ActionState::action_type],
     start: |_| Box::new(Statuses::default()),
 };
 
@@ -42,7 +40,7 @@ pub(crate) const RESULTS: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[],
-    needs: &[],
+    needs: &[StateView::action_states, ActionState::result_description],
     start: |_| Box::new(Results::default()),
 };
 
@@ -59,14 +57,14 @@ impl Running for Statuses {
         context: &CheckContext<'_>,
         findings: &mut Vec<CheckFinding>,
     ) -> bool {
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
         let held = is_held(state);
         let predefined = context.pack.vocabulary().get("action");
         let mut judged = false;
-        for action in elements(state, "actionStates").take(ACTIONS) {
-            let (kind, status) = (text(action, "actionType"), text(action, "actionStatus"));
+        for action in state.action_states.iter().take(ACTIONS) {
+            let (kind, status) = (action.action_type.or_empty(), action.action_status.or_empty());
             let described = predefined.and_then(|all| all.get(kind)?.get("statuses")?.as_array());
             let Some(described) = described else { continue };
             judged = true;
@@ -86,13 +84,9 @@ impl Running for Statuses {
 }
 
 /// Whether a pause, the protective field or the emergency stop holds the vehicle.
-fn is_held(state: &Value) -> bool {
-    let safety = state.get("safetyState");
-    let flag = |value: Option<&Value>| value.and_then(Value::as_bool) == Some(true);
-    let stop = safety.map_or("", |safety| text(safety, "eStop"));
-    flag(state.get("paused"))
-        || flag(safety.and_then(|safety| safety.get("fieldViolation")))
-        || !matches!(stop, "" | "NONE")
+fn is_held(state: &StateView) -> bool {
+    let stop = state.emergency_stop().unwrap_or_default();
+    state.paused.is(true) || state.field_violation() == Some(true) || !matches!(stop, "" | "NONE")
 }
 
 #[derive(Default)]
@@ -109,14 +103,12 @@ impl Results {
         if !is_factsheet(Seen::Delivered) && !is_factsheet(Seen::Stored) {
             return;
         }
-        let features = record.json().and_then(|factsheet| factsheet.get("protocolFeatures"));
-        let actions = features
-            .into_iter()
-            .flat_map(|features| elements(features, "agvActions"));
-        let described = actions.filter(|action| !text(action, "resultDescription").trim().is_empty());
+        let sheet = record.message().and_then(MessageView::factsheet);
+        let actions = sheet.into_iter().flat_map(|sheet| sheet.offered_actions());
+        let described = actions.filter(|action| !action.result_description.or_empty().trim().is_empty());
         self.described = described
             .take(TYPES)
-            .map(|action| text(action, "actionType").to_owned())
+            .map(|action| action.action_type.or_empty().to_owned())
             .collect();
     }
 }
@@ -124,17 +116,17 @@ impl Results {
 impl Running for Results {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.learn(record);
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
         let mut judged = false;
-        for action in elements(state, "actionStates").take(ACTIONS) {
-            let kind = text(action, "actionType");
-            if text(action, "actionStatus") != "FINISHED" || !self.described.contains(kind) {
+        for action in state.action_states.iter().take(ACTIONS) {
+            let kind = action.action_type.or_empty();
+            if !action.action_status.is("FINISHED") || !self.described.contains(kind) {
                 continue;
             }
             judged = true;
-            if text(action, "resultDescription").is_empty() && self.reported.insert(kind.to_owned()) {
+            if action.result_description.or_empty().is_empty() && self.reported.insert(kind.to_owned()) {
                 let text = format!("{} is FINISHED without the result its factsheet describes", quote(kind));
                 findings.push(remark("STATE-MSG-12", record.seq(), text));
             }

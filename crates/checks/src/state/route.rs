@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 
 use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{number, text};
-use tck_world::{Element, Fact, Listen, Observation, OrdersSent, SentOrder, Topic, read_elements};
+use tck_view::StateView;
+use tck_world::{Element, Fact, Listen, Observation, OrdersSent, SentOrder, Topic, edges_left, nodes_left};
 
 /// `state/remaining-route`.
 pub(crate) const REMAINING_ROUTE: Check = Check {
@@ -19,7 +19,11 @@ pub(crate) const REMAINING_ROUTE: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Shown, Fact::Orders],
-    needs: &[],
+    needs: &[
+        StateView::node_states,
+        StateView::edge_states,
+        StateView::order_update_id,
+    ],
     start: |_| Box::new(RemainingRoute::default()),
 };
 
@@ -32,7 +36,7 @@ pub(crate) const LAST_NODE: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Shown, Fact::Orders],
-    needs: &[],
+    needs: &[StateView::last_node_id, StateView::last_node_sequence_id],
     start: |_| Box::new(LastNode::default()),
 };
 
@@ -64,11 +68,9 @@ impl Running for RemainingRoute {
         let Some(state) = shown.state(record) else {
             return false;
         };
-        let (Some(update), Some(nodes), Some(edges)) = (
-            number(state, "orderUpdateId"),
-            read_elements(state, "nodeStates", "nodeId"),
-            read_elements(state, "edgeStates", "edgeId"),
-        ) else {
+        let (Some(update), Some(nodes), Some(edges)) =
+            (state.order_update_id.whole(), nodes_left(state), edges_left(state))
+        else {
             return false;
         };
         if self.of.as_deref() != shown.order() {
@@ -84,7 +86,7 @@ impl Running for RemainingRoute {
             orders: context.world.orders(),
             adopted: &self.adopted,
         };
-        let order = text(state, "orderId");
+        let order = state.order_id.or_empty();
         let candidates: Vec<&SentOrder> = route.orders.candidates(order, update).collect();
         // A vehicle that adopts an order it should have refused is the business of the tests.
         if candidates.is_empty() || candidates.iter().any(|sent| !sent.sound) {
@@ -315,7 +317,7 @@ impl Running for LastNode {
         let seq = record.seq();
         let shown = context.world.shown();
         let Some(state) = shown.state(record) else {
-            if record.state_json().is_some() {
+            if record.state().is_some() {
                 self.before = None;
             }
             return false;
@@ -328,13 +330,13 @@ impl Running for LastNode {
             findings.push(broken("STATE-MSG-04", seq, text));
         }
         let before = self.before.replace((order.clone(), node.clone(), sequence));
-        let ahead = read_elements(state, "nodeStates", "nodeId");
+        let ahead = nodes_left(state);
         let ahead = ahead.iter().flatten().map(|element| element.sequence).collect();
         let ahead_before = std::mem::replace(&mut self.ahead, ahead);
         let Some((_, node_before, sequence_before)) = before.filter(|before| before.0 == order) else {
             return false;
         };
-        if (&node_before, sequence_before) == (&node, sequence) || text(state, "orderId").is_empty() {
+        if (&node_before, sequence_before) == (&node, sequence) || state.order_id.or_empty().is_empty() {
             return true;
         }
         let sent: Vec<&SentOrder> = context.world.orders().of(&order).collect();

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 
 use crate::finding::{broken, quote};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, text};
+use tck_view::StateView;
 use tck_world::{Fact, Listen, Observation, Placed, Topic};
 
 /// How many actions are kept in mind from one state to the next.
@@ -22,7 +22,7 @@ pub(crate) const TRIGGERS: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Shown, Fact::Orders],
-    needs: &[],
+    needs: &[StateView::action_states, StateView::order_id],
     start: |_| Box::new(Triggers::default()),
 };
 
@@ -51,7 +51,7 @@ impl Running for Triggers {
         else {
             return false;
         };
-        let sent: Vec<_> = context.world.orders().of(text(state, "orderId")).collect();
+        let sent: Vec<_> = context.world.orders().of(state.order_id.or_empty()).collect();
         let here = sent
             .iter()
             .flat_map(|sent| &sent.nodes)
@@ -61,8 +61,8 @@ impl Running for Triggers {
         }
         let progress = *sequence;
         let mut open = BTreeSet::new();
-        for action in elements(state, "actionStates").take(ACTIONS) {
-            let (id, status) = (text(action, "actionId"), text(action, "actionStatus"));
+        for action in state.action_states.iter().take(ACTIONS) {
+            let (id, status) = (action.action_id.or_empty(), action.action_status.or_empty());
             let places: Vec<&Placed> = sent
                 .iter()
                 .flat_map(|sent| &sent.actions)
