@@ -33,7 +33,7 @@ use tck_journal::event::{Event, Occurrence, Payload, StepEnd};
 use tck_judge::{JudgeError, Progress, TestJudge};
 use tck_net::bench::{LinkError, Offer, Outgoing};
 use tck_net::link::Link;
-use tck_suite::model::{Section, Step, Test, Verb};
+use tck_suite::model::{Purpose, Section, Step, Test, Verb};
 
 /// More time than this is not left between two orders.
 const LONGEST_INTERVAL: Duration = Duration::from_secs(10);
@@ -186,11 +186,14 @@ impl<L: Link, O: Operator> Engine<L, O> {
                 if step.spec.as_ref().is_some_and(|spec| !spec.contains(version)) {
                     continue;
                 }
-                if section == Section::Finally
-                    && ((is_cancelling(step) && *spared.get_or_insert_with(|| self.spares_cancelling(begun)))
-                        || (is_calling_off(step) && *spared.get_or_insert_with(|| self.spares_calling_off(begun)))
-                        || (is_driving_on(step) && self.device_is_gone()))
-                {
+                let passed_over = match step.purpose.filter(|_| section == Section::Finally) {
+                    Some(Purpose::Cancels) => *spared.get_or_insert_with(|| self.spares_cancelling(begun)),
+                    Some(Purpose::CallsOff) => *spared.get_or_insert_with(|| self.spares_calling_off(begun)),
+                    Some(Purpose::DrivesOn) => self.device_is_gone(),
+                    // A master control has to hear that the vehicle is done before somebody moves it.
+                    Some(Purpose::Waits | Purpose::Undoes) | None => false,
+                };
+                if passed_over {
                     continue;
                 }
                 let goes_on = self
@@ -447,7 +450,6 @@ impl<L: Link, O: Operator> Engine<L, O> {
     }
 }
 
-/// Whether a step of a postamble comes from the state that cancels whatever is left.
 /// Until when a step has to be waited for; `None` when it is decided.
 fn time_for(test: &TestJudge, probed: bool) -> Option<Moment> {
     match test.progress() {
@@ -456,19 +458,4 @@ fn time_for(test: &TestJudge, probed: bool) -> Option<Moment> {
         Progress::NeedsProbe(ends) if !probed => Some(ends),
         Progress::NeedsProbe(ends) => Some(test.probe_until().unwrap_or(ends)),
     }
-}
-
-fn is_cancelling(step: &Step) -> bool {
-    step.path.contains("/cancel-order[")
-}
-
-/// Whether a step of a postamble comes from the state in which a master control calls off what it still wants. The
-/// pause in it is kept: a master control has to hear that the vehicle is done before somebody moves it.
-fn is_calling_off(step: &Step) -> bool {
-    step.path.contains("/called-off[") && !step.path.contains("/settled[")
-}
-
-/// Whether a step of a postamble waits for the vehicle to drive what was released to it.
-fn is_driving_on(step: &Step) -> bool {
-    step.path.contains("/base-done[")
 }

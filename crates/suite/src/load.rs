@@ -5,16 +5,16 @@ use std::sync::Arc;
 
 use super::fields::{Fields, Problems};
 use super::lint::{self, HeaderPlaces, Vocabulary};
-use super::model::{CourseNeed, Maturity, Test};
+use super::model::{CourseNeed, Maturity, Purpose, Test};
 use super::read::{named, read_monitor, read_test, start};
-use super::source::{States, parse};
+use super::source::{State, States, parse};
 use super::steps::StepReader;
 use super::{CheckInfo, Suites, exceptions};
 use tck_base::diagnostic::{Diagnostic, Source, Span};
 use tck_base::yaml::Node;
 use tck_pack::Role;
 
-const STATE_KEYS: &[&str] = &["state", "title", "steps"];
+const STATE_KEYS: &[&str] = &["state", "title", "purpose", "steps"];
 
 /// Reads one file and remembers its steps.
 fn read_state(states: &mut States, name: &str, source: &Arc<Source>, problems: &mut Problems) {
@@ -33,7 +33,9 @@ fn read_state(states: &mut States, name: &str, source: &Arc<Source>, problems: &
     if steps.list().is_some_and(<[Node]>::is_empty) {
         problems.at("empty-steps", &steps.span, "a state without steps", "nothing to do");
     }
-    states.insert(name, Some(steps.clone()));
+    let purpose = fields.word("purpose", "unknown-purpose", &Purpose::WORDS, problems);
+    let steps = steps.clone();
+    states.insert(name, Some(State { purpose, steps }));
 }
 
 /// Loads every file below `suites/`, given by path and text. What the linter says of a file that is checked is known:
@@ -207,7 +209,9 @@ fn lint_state(
     known: &[CheckInfo],
     problems: &mut Problems,
 ) {
-    let Some(steps) = states.steps_of(name) else { return };
+    let Some(State { purpose, steps }) = states.get(name) else {
+        return;
+    };
     if source.text.contains("${with.") {
         return;
     }
@@ -222,6 +226,7 @@ fn lint_state(
     let mut reader = StepReader {
         states,
         inside: vec![name.to_owned()],
+        purpose: *purpose,
         problems: &mut *problems,
     };
     let given = reader.steps(steps, "steps", None);

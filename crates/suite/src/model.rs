@@ -4,6 +4,7 @@ mod conversation;
 mod drawn;
 mod monitor;
 mod path;
+mod purpose;
 mod tags;
 mod vehicle;
 
@@ -165,6 +166,7 @@ pub use conversation::{BrokenMember, Said};
 pub use drawn::{Drawn, Kind};
 pub use monitor::{About, Monitor, Recordings, Rule};
 pub use path::Path;
+pub use purpose::Purpose;
 pub use tck_course::CourseNeed;
 pub use tck_journal::ServeBehaviour;
 pub use vehicle::{VehicleStep, Which};
@@ -180,6 +182,8 @@ pub struct Step {
     pub spec: Option<VersionRange>,
     /// The verb and its arguments.
     pub verb: Verb,
+    /// What the innermost state that it comes from, and that says so, is for.
+    pub purpose: Option<Purpose>,
     /// Whether its requirements stand under `owes:`: a precondition that is itself an obligation of the device.
     pub owes: bool,
     /// Whether its requirements stand under `prefers:`: broken is a warning by a ruling of the catalogue.

@@ -365,6 +365,7 @@ impl TestReader<'_> {
         let mut reader = StepReader {
             states: self.states,
             inside: Vec::new(),
+            purpose: None,
             problems: &mut *problems,
         };
         let mut section = |key: &str| match fields.get(key, reader.problems) {

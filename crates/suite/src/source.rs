@@ -4,15 +4,24 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::fields::Problems;
+use super::model::Purpose;
 use tck_base::diagnostic::{Diagnostic, Source, Span};
 use tck_base::yaml::{self, Node};
 
-/// The states of `suites/states/`, by name. A state whose file is broken is known without its steps.
+/// What a file of a state says.
+pub(super) struct State {
+    /// What it is for, where it says so.
+    pub(super) purpose: Option<Purpose>,
+    /// The list of its steps.
+    pub(super) steps: Node,
+}
+
+/// The states of `suites/states/`, by name. A state whose file is broken is known without what it says.
 #[derive(Default)]
-pub(super) struct States(BTreeMap<String, Option<Node>>);
+pub(super) struct States(BTreeMap<String, Option<State>>);
 
 impl States {
-    pub(super) fn steps_of(&self, name: &str) -> Option<&Node> {
+    pub(super) fn get(&self, name: &str) -> Option<&State> {
         self.0.get(name)?.as_ref()
     }
 
@@ -24,9 +33,9 @@ impl States {
         self.0.keys().map(String::as_str).collect()
     }
 
-    /// Knows a state; without its steps when its file is broken.
-    pub(super) fn insert(&mut self, name: &str, steps: Option<Node>) {
-        self.0.insert(name.to_owned(), steps);
+    /// Knows a state; without what it says when its file is broken.
+    pub(super) fn insert(&mut self, name: &str, state: Option<State>) {
+        self.0.insert(name.to_owned(), state);
     }
 }
 

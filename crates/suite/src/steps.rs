@@ -4,8 +4,8 @@ use super::expand::Fill;
 use super::fields::{Fields, Problems, text_of, word_of};
 use super::grammar::{time, walk};
 use super::model::{
-    ActionWalk, Always, Assertion, Binding, CheckUse, Expect, Extent, From, Never, Path, Retained, Selection, Step,
-    TimeTerm, Until, Verb,
+    ActionWalk, Always, Assertion, Binding, CheckUse, Expect, Extent, From, Never, Path, Purpose, Retained, Selection,
+    Step, TimeTerm, Until, Verb,
 };
 use super::source::States;
 use super::stimuli::{
@@ -63,6 +63,8 @@ pub(super) struct StepReader<'a> {
     pub(super) states: &'a States,
     /// The states being inlined at the moment.
     pub(super) inside: Vec<String>,
+    /// What the innermost of them that says so is for.
+    pub(super) purpose: Option<Purpose>,
     pub(super) problems: &'a mut Problems,
 }
 
@@ -154,6 +156,7 @@ impl StepReader<'_> {
             title,
             spec,
             verb,
+            purpose: self.purpose,
             owes: owes.is_some(),
             prefers: prefers.is_some(),
             span: node.span.clone(),
@@ -205,7 +208,7 @@ impl StepReader<'_> {
             return;
         };
         let states = self.states;
-        let Some(body) = states.steps_of(name) else {
+        let Some(found) = states.get(name) else {
             // A state whose file is broken has been noted there.
             if !states.is_known(name) {
                 self.problems
@@ -231,7 +234,7 @@ impl StepReader<'_> {
             })
         });
         let mut fill = Fill::new("with", values);
-        let filled = fill.apply_to(body, self.problems);
+        let filled = fill.apply_to(&found.steps, self.problems);
         for ((key, _), used) in values.iter().zip(&fill.used) {
             if !used {
                 let name = key.text().unwrap_or_default();
@@ -243,9 +246,28 @@ impl StepReader<'_> {
                 );
             }
         }
+        let purpose = found.purpose.or(self.purpose);
+        if purpose.is_none() && path.starts_with("finally[") {
+            self.without_purpose(name, &state.span);
+        }
         self.inside.push(name.to_owned());
+        let outer = std::mem::replace(&mut self.purpose, purpose);
         steps.extend(self.steps(&filled, &format!("{path}/{name}"), spec));
+        self.purpose = outer;
         self.inside.pop();
+    }
+
+    fn without_purpose(&mut self, name: &str, span: &Span) {
+        let words: Vec<&str> = Purpose::WORDS.iter().map(|(word, _)| *word).collect();
+        self.problems.add(
+            Diagnostic::new(
+                "state-without-purpose",
+                span.clone(),
+                format!("the state `{name}` does not say what it is for"),
+                "in `finally`, that decides when it is passed over",
+            )
+            .hint(format!("give the state `purpose:`, one of {}", words.join(", "))),
+        );
     }
 
     fn verb(&mut self, word: &str, value: &Node, fields: &Fields<'_>, at: &Span) -> Option<Verb> {

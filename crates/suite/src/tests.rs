@@ -5,7 +5,7 @@ use std::path::Path;
 
 use proptest::prelude::*;
 
-use super::model::{Extent, From, RoutePlace, Section, Verb};
+use super::model::{Extent, From, Purpose, RoutePlace, Section, Verb};
 use super::*;
 use tck_base::pattern::TermKind;
 use tck_pack::Role;
@@ -129,6 +129,35 @@ fn states_are_inlined_with_their_path() {
         test.sections().map(|(section, _)| section),
         [Section::Given, Section::Steps, Section::Finally]
     );
+}
+
+#[test]
+fn the_innermost_state_that_says_so_decides_what_a_step_is_for() {
+    let mut files = good();
+    let state = |name: &str, purpose: &str, steps: &str| {
+        let text = format!("state: {name}\ntitle: A state of somebody\n{purpose}steps:\n{steps}");
+        (format!("suites/states/{name}.yaml"), text)
+    };
+    let wait = "  - expect: state\n    within: 5 s\n";
+    files.extend([
+        state("mine/plain", "", wait),
+        state("mine/patient", "purpose: waits\n", wait),
+        state(
+            "mine/over",
+            "purpose: cancels\n",
+            &format!("{wait}  - use: mine/plain\n  - use: mine/patient\n{wait}"),
+        ),
+    ]);
+    let test = files
+        .get_mut("suites/agv/order/update-lower-id-refused.yaml")
+        .expect("a test");
+    *test = test.replace("- use: cancel-order", "- use: mine/over");
+    let suites = World::new().load(&files).expect("good suites");
+    let test = test_of(&suites, "order/update-lower-id-refused");
+    let purposes: Vec<_> = test.finally.iter().map(|step| step.purpose).collect();
+    let cancels = Some(Purpose::Cancels);
+    assert_eq!(purposes, [cancels, cancels, Some(Purpose::Waits), cancels]);
+    assert!(test.given.iter().all(|step| step.purpose.is_none()));
 }
 
 #[test]
