@@ -42,6 +42,88 @@ fn what_mosquitto_sub_prints_is_judged_between_the_lines_of_a_log() {
 }
 
 #[test]
+fn what_a_recording_holds_is_found_in_every_form() {
+    let bench = Bench::new();
+    let text = fs::read_to_string(capture("one-idle-state.jsonl")).unwrap();
+    let all: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let member = |message: &Value, name: &str| message[name].as_str().unwrap().to_owned();
+    let timed = all.iter().map(|message| {
+        let (time, topic) = (member(message, "tst"), member(message, "topic"));
+        format!("{time} {topic} {}\n", message["payload"])
+    });
+    let rows = all.iter().map(|message| {
+        let (time, topic) = (member(message, "tst"), member(message, "topic"));
+        let payload = message["payload"].to_string().replace('"', "\"\"");
+        format!("{time};{topic};0;\"{payload}\"\n")
+    });
+    let wide = text.encode_utf16().flat_map(u16::to_le_bytes);
+    let forms: [(&str, Vec<u8>); 4] = [
+        ("array.json", serde_json::to_vec(&all).unwrap()),
+        ("pretty.json", serde_json::to_vec_pretty(&all).unwrap()),
+        (
+            "rows.csv",
+            format!("time;topic;retain;payload\n{}", rows.collect::<String>()).into_bytes(),
+        ),
+        ("wide.jsonl", [vec![0xff, 0xfe], wide.collect()].concat()),
+    ];
+    for (name, bytes) in forms {
+        fs::write(bench.path().join(name), bytes).unwrap();
+        let found = result(&run_in(bench.path(), &["audit", name, "--format", "json"]).code(1));
+        let side = &found["vehicles"][0]["sides"][0];
+        assert!(side["findings"].to_string().contains("STATE-12"), "{name}: {side}");
+    }
+    // Where RETAIN is not recorded, the only idle state may be an old one: then it is said that nothing was compared.
+    fs::write(bench.path().join("timed.txt"), timed.collect::<String>()).unwrap();
+    let ended = run_in(bench.path(), &["audit", "timed.txt"]);
+    for wanted in ["1 connection, 1 order, 7 state", "were not compared", "timed.txt:4"] {
+        assert!(ended.stdout.contains(wanted), "{wanted}: {}", ended.stdout);
+    }
+    fs::write(bench.path().join("packed.zip"), b"PK\x03\x04 and more").unwrap();
+    run_in(bench.path(), &["audit", "packed.zip"])
+        .code(2)
+        .says("ZIP archive");
+}
+
+#[test]
+fn a_version_that_is_none_hides_nothing_and_may_be_told() {
+    let bench = Bench::new();
+    let state = fs::read_to_string(format!(
+        "{}/fixtures/messages/2.1/good/state-idle.json",
+        env!("CARGO_MANIFEST_DIR")
+    ));
+    let mut state: Value = serde_json::from_str(&state.unwrap()).unwrap();
+    state["version"] = "1.3.2".into();
+    state.as_object_mut().unwrap().remove("orderUpdateId");
+    fs::write(bench.path().join("state.json"), state.to_string()).unwrap();
+    let ended = run_in(bench.path(), &["validate", "state.json"]).code(2);
+    assert!(
+        ended.stdout.contains("HDR-04") && ended.stdout.contains("orderUpdateId"),
+        "{}",
+        ended.stdout
+    );
+    state["version"] = "3.0.0".into();
+    fs::write(bench.path().join("state.json"), state.to_string()).unwrap();
+    let ended = run_in(bench.path(), &["validate", "state.json"]).code(2);
+    assert!(
+        ended.stdout.contains("3.0.0 is not known to this program"),
+        "{}",
+        ended.stdout
+    );
+    run(&["audit", &capture("one-idle-state.jsonl"), "--protocol", "9.1"])
+        .code(2)
+        .says("9.1 is not known");
+    let told = run(&[
+        "audit",
+        &capture("one-idle-state.jsonl"),
+        "--protocol",
+        "2.0",
+        "--format",
+        "json",
+    ]);
+    assert_eq!(result(&told)["vehicles"][0]["protocol"], "2.0.0");
+}
+
+#[test]
 fn vehicles_times_and_monitors_can_be_chosen() {
     let two = capture("two-versions.jsonl");
     let only = result(&run(&["audit", &two, "--vehicle", "vda5050-tck/mock-1", "--format", "json"]).code(0));
