@@ -93,6 +93,21 @@ fn every_suite_loads_without_a_complaint() {
 }
 
 #[test]
+fn every_title_is_a_sentence_without_holes() {
+    let (suites, _) = load();
+    for test in &suites.tests {
+        let steps = test.sections().into_iter().flat_map(|(_, steps)| steps);
+        let titles = steps.filter_map(|step| step.title.as_deref());
+        for title in titles.chain([test.title.as_str()]) {
+            assert!(!title.contains("${"), "{}: {title}", test.id);
+        }
+    }
+    for monitor in &suites.monitors {
+        assert!(!monitor.title.contains("${"), "{}: {}", monitor.id, monitor.title);
+    }
+}
+
+#[test]
 fn every_named_check_has_a_monitor_or_a_test() {
     let (suites, _) = load();
     for check in checks::REGISTRY {

@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
+use std::time::Duration;
 
 use serde_json::{Map, Value, json};
 
@@ -155,6 +156,10 @@ impl run::Progress for Followed {
     fn note(&mut self, text: &str) {
         self.screen.note(text);
         self.tell("note", json!({ "text": text }));
+    }
+
+    fn left(&mut self, left: Duration) {
+        self.screen.left(left);
     }
 
     fn expects_device(&mut self, bench: &BenchInfo) {

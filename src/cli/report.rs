@@ -11,7 +11,7 @@ use super::problem::Problem;
 use tck_base::diagnostic::Diagnostic;
 use tck_journal::file::{self, NAME, PACKED, Recording};
 use tck_judge as judge;
-use tck_report::{compare, json as result_file, manifest, overview, side_by_side};
+use tck_report::{clean, compare, headline, json as result_file, manifest, overview, side_by_side};
 use tck_result::RunResult;
 use tck_run::{Bundle, sources, write_all};
 
@@ -29,6 +29,9 @@ pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem
     if arguments.certificate {
         return super::papers::certificate(folder);
     }
+    if let Some(number) = arguments.message {
+        return message(folder, number, arguments.format);
+    }
     let mut library = crate::assets::library(arguments.suites.own())?;
     library.add(&own_tests(folder)?)?;
     if !arguments.renderings.is_empty() {
@@ -38,9 +41,7 @@ pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem
         return super::papers::attestation(folder, &library);
     }
     let path = file::find(folder);
-    let Recording { journal, torn } = file::read(&path).map_err(|error| {
-        Problem::from(Diagnostic::whole("journal", error.to_string()).hint("give the folder of a finished run"))
-    })?;
+    let Recording { journal, torn } = journal_of(&path)?;
     if torn {
         eprintln!("the last line of the journal is cut off, as after a crash; everything before it is used");
     }
@@ -81,6 +82,36 @@ pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem
         }
     };
     Ok(Exit::of(result.verdict))
+}
+
+fn journal_of(path: &Path) -> Result<Recording, Problem> {
+    file::read(path).map_err(|error| {
+        Problem::from(Diagnostic::whole("journal", error.to_string()).hint("give the folder of a finished run"))
+    })
+}
+
+/// Prints one record: what it is, when and where it was seen, and the message as it was sent.
+fn message(folder: &Path, number: u64, format: Format) -> Result<Exit, Problem> {
+    let Recording { journal, .. } = journal_of(&file::find(folder))?;
+    let Some(entry) = journal.entries().iter().find(|entry| entry.seq() == number) else {
+        let last = journal.entries().last().map_or(0, |entry| entry.seq());
+        let title = format!("the journal has no record #{number}; its last one is #{last}");
+        return Err(Diagnostic::whole("message", title).into());
+    };
+    let broken = |error: serde_json::Error| Problem::Environment(error.to_string());
+    if let Format::Json = format {
+        return super::print(&format!("{}\n", serde_json::to_string(&entry.record).map_err(broken)?));
+    }
+    let shown = match entry.json() {
+        Some(message) => serde_json::to_string_pretty(message),
+        None => serde_json::to_string_pretty(&entry.record),
+    };
+    super::print(&format!(
+        "{}\n{:.3}\n{}\n",
+        headline::reference(Some(entry), number),
+        entry.at().utc,
+        clean::block(&shown.map_err(broken)?)
+    ))
 }
 
 /// The tests that lie in a bundle because no suite has them: conversations of an exploration.

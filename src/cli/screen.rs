@@ -3,7 +3,7 @@
 use std::io;
 use std::time::Duration;
 
-use crate::ui::{Desk, Progress as _, RunTitle, Terminal, TerminalOptions, TestLine};
+use crate::ui::{Desk, Heartbeat, Progress as _, RunTitle, Terminal, TerminalOptions, TestLine};
 use tck_base::verdict::{Outcome, Verdict};
 use tck_engine::Watcher;
 use tck_journal::event::{Gate, Plan};
@@ -18,6 +18,8 @@ pub struct Screen {
     title: RunTitle,
     show: Show,
     desk: Desk,
+    /// Where no bar shows that it goes on.
+    heartbeat: Option<Heartbeat>,
 }
 
 /// Which tests a person wants to see while a run goes on.
@@ -40,6 +42,7 @@ impl Screen {
             ..TerminalOptions::of_process()
         };
         Self {
+            heartbeat: (!options.bar).then(Heartbeat::start),
             terminal: Terminal::stdout(options),
             title: RunTitle {
                 device,
@@ -56,11 +59,19 @@ impl Screen {
     #[must_use]
     pub fn beside_log(mut self) -> Self {
         self.terminal.without_bar();
+        self.heartbeat = None;
         self
+    }
+
+    fn beat(&self, tell: impl FnOnce(&Heartbeat)) {
+        if let Some(heartbeat) = &self.heartbeat {
+            tell(heartbeat);
+        }
     }
 
     /// Takes the bar away.
     pub fn finish(&mut self) {
+        self.heartbeat = None;
         self.desk.at_rest();
         self.terminal.clear();
     }
@@ -77,6 +88,7 @@ impl Watcher for Screen {
         };
         let what = step.title.as_deref().unwrap_or(what);
         self.terminal.waiting(what, Duration::ZERO);
+        self.beat(|heartbeat| heartbeat.awaits(what));
     }
 }
 
@@ -95,9 +107,11 @@ impl run::Progress for Screen {
     fn test_begun(&mut self, test: &Test, _number: usize, _of: usize) {
         self.desk.runs(&test.id);
         self.terminal.test_begun(&test.id, &test.title);
+        self.beat(|heartbeat| heartbeat.begins(&test.id));
     }
 
     fn test_ended(&mut self, result: &TestResult) {
+        self.beat(Heartbeat::ended);
         let verdict = result.verdict.unwrap_or(Verdict::Error);
         if self.show == Show::Failures && verdict < Verdict::Error {
             return;
@@ -115,6 +129,13 @@ impl run::Progress for Screen {
 
     fn note(&mut self, text: &str) {
         self.terminal.note(text);
+        self.beat(Heartbeat::told);
+    }
+
+    fn left(&mut self, left: Duration) {
+        let left = run::in_words(left);
+        self.terminal.left(&left);
+        self.beat(|heartbeat| heartbeat.left(left));
     }
 
     fn expects_device(&mut self, bench: &BenchInfo) {

@@ -4,6 +4,7 @@
 //! escaped, because they may hold anything. What is told is decided elsewhere.
 
 mod full_screen;
+mod heartbeat;
 mod keyboard;
 mod listing;
 mod output;
@@ -13,6 +14,7 @@ mod terminal;
 mod watching;
 
 pub use full_screen::FullScreen;
+pub use heartbeat::Heartbeat;
 pub use listing::{faults, hooks, tolerances, vehicle_words};
 pub use output::{Output, escaped};
 pub use progress::{Progress, RunTitle, TestLine};

@@ -244,9 +244,9 @@ fn meaning(key: KeyEvent) -> Option<Answer> {
 fn said(answer: &Answer) -> &'static str {
     match answer {
         Answer::Done => "done",
-        Answer::Skip => "the test is skipped",
+        Answer::Skip => "this is skipped, and what needs it is undecided",
         Answer::End => "the run ends",
-        Answer::Silence => "nobody answered in time",
+        Answer::Silence => "nobody answered in time; what needs it is undecided",
         Answer::GivenUp | Answer::Unasked(_) => "the question is withdrawn",
     }
 }

@@ -42,6 +42,8 @@ pub struct Terminal<W, E> {
     notes: Output<E>,
     options: TerminalOptions,
     bar: ProgressBar,
+    /// How much of the run is left, in words.
+    left: Option<String>,
 }
 
 impl Terminal<io::Stdout, io::Stderr> {
@@ -60,7 +62,13 @@ impl<W: Write, E: Write> Terminal<W, E> {
             notes: Output::to(notes),
             options,
             bar: ProgressBar::hidden(),
+            left: None,
         }
+    }
+
+    /// So much of the run is left; shown with the next test.
+    pub fn left(&mut self, left: &str) {
+        self.left = Some(left.to_owned());
     }
 
     /// Whether nobody reads the results any more.
@@ -140,7 +148,11 @@ impl<W: Write, E: Write> Progress for Terminal<W, E> {
     }
 
     fn test_begun(&mut self, id: &str, title: &str) {
-        self.bar.set_prefix(escaped(id));
+        let left = self
+            .left
+            .as_ref()
+            .map_or_else(String::new, |left| format!("{left} left  "));
+        self.bar.set_prefix(format!("{left}{}", escaped(id)));
         self.bar.set_message(escaped(title));
     }
 

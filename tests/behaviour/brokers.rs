@@ -354,3 +354,16 @@ fn a_vehicle_that_may_not_read_its_orders_is_not_accused_where_nobody_sees_it() 
         .prints("without a tap nobody can tell whether the broker lets the device read");
     bench.is_whole();
 }
+
+#[test]
+fn a_vehicle_that_dies_is_named_where_no_tap_sees_it_go() {
+    let Some(broker) = Mosquitto::start_with(|_| "allow_anonymous true\n".to_owned()) else {
+        return;
+    };
+    let bench = Bench::new();
+    let (mut run, mut agv) = with_vehicle(&bench, &broker.url(), "tap = false\n", None);
+    run.line("estimated time");
+    agv.kill();
+    run.line("the device is gone since #");
+    run.end().says("CONNECTIONBROKEN on its connection topic");
+}

@@ -248,7 +248,7 @@ fn after_its_time_a_question_reads_nothing_and_leaves_the_terminal_as_it_was() {
     terminal.shows("nobody answered in time");
     terminal.shows("ended with");
     assert!(journal(&bench).contains("nobody answered within 2 s"));
-    terminal.ended(5);
+    terminal.ended(3);
 }
 
 #[test]

@@ -35,6 +35,27 @@ fn a_virtual_run_is_judged_again_to_the_same_bytes_whether_it_passed_or_failed()
 }
 
 #[test]
+fn a_message_of_the_journal_is_printed_by_its_number() {
+    let (bench, folder) = failed_run();
+    let fails = bench.result()["tests"][0]["decisions"].clone();
+    let fails = fails
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|decision| decision["verdict"] == "fail");
+    let seen = fails.unwrap()["witness"].to_string();
+    bench
+        .run(&["report", &folder, "--message", &seen])
+        .code(0)
+        .prints(&format!("#{seen} state"))
+        .prints("\"errorType\": ");
+    bench
+        .run(&["report", &folder, "--message", "999999"])
+        .code(2)
+        .says("the journal has no record #999999");
+}
+
+#[test]
 fn a_journal_line_that_was_edited_is_noticed() {
     let (bench, folder) = failed_run();
     change(

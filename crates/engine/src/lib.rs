@@ -30,7 +30,7 @@ pub use unmade::ComposeError;
 
 use tck_base::clock::Moment;
 use tck_journal::event::{Event, Occurrence, Payload, StepEnd};
-use tck_judge::{JudgeError, Progress, TestJudge};
+use tck_judge::{JudgeError, Progress, Sign, TestJudge};
 use tck_net::bench::{LinkError, Offer, Outgoing};
 use tck_net::link::Link;
 use tck_suite::model::{Purpose, Section, Step, Test, Verb};
@@ -59,6 +59,11 @@ impl From<JudgeError> for EngineError {
 pub trait Watcher {
     /// A step has begun to wait.
     fn waiting(&mut self, step: &Step);
+
+    /// The device has just gone, as far as it shows; the text says how.
+    fn gone(&mut self, how: &str) {
+        let _ = how;
+    }
 }
 
 /// Performs tests.
@@ -80,6 +85,8 @@ pub struct Engine<L, O> {
     pub repetition: Option<u32>,
     /// When the last order was sent.
     last_order: Option<Moment>,
+    /// The record since which the device was last said to be gone.
+    told_gone: Option<u64>,
     interrupt: tokio::sync::watch::Receiver<bool>,
 }
 
@@ -101,6 +108,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
             map_files: Vec::new(),
             repetition: None,
             last_order: None,
+            told_gone: None,
             interrupt,
         }
     }
@@ -193,7 +201,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
                     // A master control has to hear that the vehicle is done before somebody moves it.
                     Some(Purpose::Waits | Purpose::Undoes) | None => false,
                 };
-                if passed_over {
+                if passed_over || (section == Section::Finally && is_releasing(step) && self.is_released(begun)) {
                     continue;
                 }
                 let goes_on = self
@@ -206,7 +214,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
                     break;
                 }
                 watcher.waiting(step);
-                if let Err(error) = self.step(step, section).await {
+                if let Err(error) = self.step(step, section, watcher).await {
                     // The postamble is still tried: a device must not be left driving.
                     outcome = outcome.and(Err(error));
                     break;
@@ -249,20 +257,41 @@ impl<L: Link, O: Operator> Engine<L, O> {
         !open && vehicle::has_nothing_to_do(judge)
     }
 
-    /// Whether the tap has seen the device go.
+    /// Whether this test has released the emergency stop already, and the device has shown that since: nobody is asked twice.
+    fn is_released(&self, begun: u64) -> bool {
+        let entries = self.recorder.journal().entries();
+        let mut own = entries.iter().rev().take_while(|entry| entry.seq() > begun);
+        let last = own.find_map(|entry| match entry.event() {
+            Event::Hook { hook, ok: true, .. } => Some((hook == RELEASE, entry.seq())),
+            Event::Hook { .. } => Some((false, 0)),
+            _ => None,
+        });
+        let Some((true, asked)) = last else { return false };
+        let judge = self.recorder.judge();
+        let none = judge.ground().pack.word("emergencyStop.none");
+        let state = judge.timeline().since("state", asked).last();
+        let stop = state.and_then(|entry| entry.json()?.pointer("/safetyState/eStop")?.as_str());
+        stop.is_some() && stop == none
+    }
+
+    /// Whether the tap has seen the device go, or it says so itself.
     fn device_is_gone(&self) -> bool {
         let judge = self.recorder.judge();
+        let gone = judge.timeline().gone(self.link.now().moment);
+        if gone.is_some_and(|gone| matches!(gone.sign, Sign::Said(_))) {
+            return true;
+        }
         let has_tap = !judge.timeline().of("mqtt/connect").is_empty();
         has_tap && !vehicle::has_open_connection(judge)
     }
 
-    async fn step(&mut self, step: &Step, section: Section) -> Result<(), EngineError> {
+    async fn step(&mut self, step: &Step, section: Section, watcher: &mut dyn Watcher) -> Result<(), EngineError> {
         self.drain().await?;
         tracing::debug!(step = step.path, "begins");
         self.note(Event::StepBegun {
             path: step.path.clone(),
         })?;
-        let done = self.perform(step, section).await;
+        let done = self.perform(step, section, watcher).await;
         let end = match &done {
             Ok(end) => end.clone(),
             Err(error) => StepEnd::Broken(error.to_string()),
@@ -279,7 +308,12 @@ impl<L: Link, O: Operator> Engine<L, O> {
         done.map(|_| ())
     }
 
-    async fn perform(&mut self, step: &Step, section: Section) -> Result<StepEnd, EngineError> {
+    async fn perform(
+        &mut self,
+        step: &Step,
+        section: Section,
+        watcher: &mut dyn Watcher,
+    ) -> Result<StepEnd, EngineError> {
         match &step.verb {
             Verb::Send(send) => {
                 if send.topic == "order" {
@@ -321,9 +355,9 @@ impl<L: Link, O: Operator> Engine<L, O> {
                     return Ok(StepEnd::Broken(format!("there is no topic {}", retained.topic)));
                 };
                 self.link.fresh_subscriber(&topic).await?;
-                self.wait(section).await
+                self.wait(section, watcher).await
             }
-            Verb::Expect(_) | Verb::Never(_) | Verb::Always(_) | Verb::Action(_) => self.wait(section).await,
+            Verb::Expect(_) | Verb::Never(_) | Verb::Always(_) | Verb::Action(_) => self.wait(section, watcher).await,
         }
     }
 
@@ -377,9 +411,10 @@ impl<L: Link, O: Operator> Engine<L, O> {
     }
 
     /// Waits for what the judge says, and no longer.
-    async fn wait(&mut self, section: Section) -> Result<StepEnd, EngineError> {
+    async fn wait(&mut self, section: Section, watcher: &mut dyn Watcher) -> Result<StepEnd, EngineError> {
         let mut probed = false;
         loop {
+            self.tell_gone(watcher);
             let Some(test) = self.recorder.judge().current() else {
                 return Ok(StepEnd::Broken("no test is running".to_owned()));
             };
@@ -391,9 +426,12 @@ impl<L: Link, O: Operator> Engine<L, O> {
             if self.recorder.flood().is_some() || (section != Section::Finally && self.interrupted()) {
                 return Ok(StepEnd::Interrupted);
             }
+            let now = self.link.now().moment;
+            let silence = self.recorder.judge().timeline().falls_silent();
+            let silence = silence.filter(|silence| *silence > now && *silence < until);
             let happened = tokio::select! {
                 biased;
-                happened = self.link.next(until) => happened?,
+                happened = self.link.next(silence.unwrap_or(until)) => happened?,
                 changed = self.interrupt.changed(), if section != Section::Finally => {
                     if changed.is_err() {
                         return Ok(StepEnd::Interrupted);
@@ -409,6 +447,8 @@ impl<L: Link, O: Operator> Engine<L, O> {
                 if test.is_some_and(|test| time_for(test, probed).is_none_or(|until| now <= until)) {
                     continue;
                 }
+            } else if silence.is_some() {
+                continue;
             }
             if !probing {
                 return Ok(StepEnd::Deadline);
@@ -416,6 +456,16 @@ impl<L: Link, O: Operator> Engine<L, O> {
             probed = true;
             let probe = self.link.probe().await?;
             self.note(Event::ProbeSent { probe })?;
+        }
+    }
+
+    /// Says that the device is gone, once for each time.
+    fn tell_gone(&mut self, watcher: &mut dyn Watcher) {
+        let gone = self.recorder.judge().timeline().gone(self.link.now().moment);
+        let since = gone.as_ref().map(|gone| gone.since.0);
+        if let Some(gone) = gone.filter(|_| since != self.told_gone) {
+            self.told_gone = since;
+            watcher.gone(&gone.to_string());
         }
     }
 
@@ -458,4 +508,11 @@ fn time_for(test: &TestJudge, probed: bool) -> Option<Moment> {
         Progress::NeedsProbe(ends) if !probed => Some(ends),
         Progress::NeedsProbe(ends) => Some(test.probe_until().unwrap_or(ends)),
     }
+}
+
+/// The hook that releases an emergency stop.
+const RELEASE: &str = "release-emergency-stop";
+
+fn is_releasing(step: &Step) -> bool {
+    matches!(&step.verb, Verb::Operator(operator) if operator.hook == RELEASE)
 }

@@ -1,5 +1,6 @@
 //! Whether the device left during a test of its own accord, as it does when it crashes.
 
+use super::gone::{Gone, Mark, Sign, ends};
 use tck_journal::Entry;
 use tck_journal::event::{Close, Event, LinkFault};
 
@@ -10,22 +11,25 @@ pub(super) struct Departure {
     disturbed: bool,
     /// The device said DISCONNECT.
     announced: bool,
-    last_sent: Option<u64>,
-    /// Close of the connection, and the message sent last before it.
-    left: Option<(u64, Option<u64>)>,
+    last_sent: Option<Mark>,
+    left: Option<Gone>,
 }
 
 impl Departure {
     pub(super) fn observe(&mut self, entry: &Entry, subject: Option<&str>) {
+        let mark = (entry.seq(), entry.at().moment);
         match entry.event() {
             Event::Fault { fault } if !matches!(fault, LinkFault::Restore) => self.disturbed = true,
             Event::Hook { .. } | Event::Vehicle { .. } | Event::Interrupted => self.disturbed = true,
-            Event::Sent { .. } => self.last_sent = Some(entry.seq()),
+            Event::Sent { .. } => self.last_sent = Some(mark),
             Event::Closed {
                 how: Close::DeviceFin | Close::DeviceReset,
                 ..
-            } if !self.disturbed && !self.announced && self.left.is_none() => {
-                self.left = Some((entry.seq(), self.last_sent));
+            } if !self.announced => self.leaves(Sign::Closed, mark),
+            Event::Message { retain: false, .. } if subject == Some("connection") => {
+                if let Some(state) = ends(entry) {
+                    self.leaves(Sign::Said(state), mark);
+                }
             }
             _ if subject == Some("mqtt/connect") => self.announced = false,
             _ if subject == Some("mqtt/disconnect") => self.announced = true,
@@ -33,15 +37,16 @@ impl Departure {
         }
     }
 
+    fn leaves(&mut self, sign: Sign, since: Mark) {
+        if !self.disturbed && self.left.is_none() {
+            let sent = self.last_sent;
+            self.left = Some(Gone { sign, since, sent });
+        }
+    }
+
     /// What happened, if the device left.
-    pub(super) fn story(&self) -> Option<String> {
-        let (closed, sent) = self.left?;
-        Some(match sent {
-            Some(sent) => {
-                format!("the device closed its connection without DISCONNECT (#{closed}) after it was sent #{sent}")
-            }
-            None => format!("the device closed its connection without DISCONNECT (#{closed})"),
-        })
+    pub(super) fn story(&self) -> Option<&Gone> {
+        self.left.as_ref()
     }
 }
 
@@ -68,7 +73,7 @@ mod tests {
             });
             departure.observe(&entry, is_disconnect.then_some("mqtt/disconnect"));
         }
-        departure.story()
+        departure.story().map(Gone::to_string)
     }
 
     fn sent() -> Event {

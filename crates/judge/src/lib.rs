@@ -9,6 +9,7 @@
 mod company;
 mod decide;
 mod departure;
+mod gone;
 mod grounds;
 mod hidden;
 mod holds;
@@ -33,6 +34,7 @@ mod unheard;
 mod watches;
 mod window;
 
+pub use gone::{Gone, Sign};
 pub use library::Library;
 pub use monitor::MonitorJudge;
 pub use rules::{JudgeError, Rules};

@@ -11,6 +11,7 @@ use serde_json::{Map, Value};
 
 use super::decide::decide;
 use super::departure::Departure;
+use super::gone::Gone;
 use super::hidden::{Hidden, Open, hide};
 use super::own_errors::{is_refused, reported};
 use super::scene::Scene;
@@ -102,6 +103,8 @@ pub struct TestJudge {
     verdict: Accumulated,
     result: TestResult,
     departure: Departure,
+    /// How it is gone when the test is over, by its silence or by its own word.
+    silent: Option<Gone>,
     /// Why what is found may stem from somebody else.
     interference: Option<Arc<str>>,
     /// The run was interrupted then, and why that says nothing about the device.
@@ -159,6 +162,7 @@ impl TestJudge {
                 repetitions: Vec::new(),
             },
             departure: Departure::default(),
+            silent: None,
             interference: ground.interference.clone(),
             interrupted: None,
             hidden: Vec::new(),
@@ -230,6 +234,9 @@ impl TestJudge {
             Event::TestEnded { .. } => {
                 self.allow_for_lag(timeline);
                 self.allow_for_others();
+                self.silent = timeline
+                    .gone(entry.at().moment)
+                    .filter(|gone| gone.sent.is_some_and(|(sent, _)| sent > self.begun.0));
                 self.finish(entry.at().moment, ground);
             }
             _ => {
@@ -543,10 +550,17 @@ impl TestJudge {
         self.result.verdict = self.verdict.get();
         let (reason, cause) = self.reason(why).unzip();
         self.result.cause = cause.flatten();
-        self.result.reason = match (reason, self.departure.story()) {
+        self.result.reason = match (reason, self.gone().map(Gone::to_string)) {
             (Some(reason), Some(story)) => Some(format!("{reason}; {story}")),
             (reason, story) => reason.or(story),
         };
+    }
+
+    /// How the device left, of its own accord, in this test. That a device which passes is quiet at the end is no matter.
+    fn gone(&self) -> Option<&Gone> {
+        let passes = self.verdict.get() == Some(Verdict::Pass);
+        let silent = self.silent.as_ref().filter(|_| !passes);
+        self.departure.story().or(silent)
     }
 
     /// Why the verdict is not a pass, and of which kind that is where more than the text tells.

@@ -13,6 +13,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
+use super::gone::{Gone, Pulse};
 use tck_base::clock::{Moment, Stamp};
 use tck_journal::Entry;
 use tck_journal::event::{Direction, Event, MockVehicle, Packet};
@@ -39,6 +40,8 @@ pub struct Timeline {
     /// When the harness itself was late: from when until when.
     lags: Vec<(Moment, Moment)>,
     last: Option<Stamp>,
+    /// Of a vehicle under test.
+    pulse: Pulse,
 }
 
 impl Timeline {
@@ -72,7 +75,11 @@ impl Timeline {
             let begun = Moment::from_micros(end.micros().saturating_sub(*micros));
             self.lags.push((begun, end));
         }
-        let subject = self.subject_of(entry)?;
+        let subject = self.subject_of(entry);
+        if !self.own {
+            self.pulse.observe(entry, subject.as_deref());
+        }
+        let subject = subject?;
         self.subjects
             .entry(subject.clone())
             .or_default()
@@ -87,6 +94,18 @@ impl Timeline {
         let at = all.partition_point(|known| known.seq() < entry.seq());
         all.insert(at, Arc::clone(entry));
         Some(subject)
+    }
+
+    /// How the vehicle under test is gone at this moment, if it shows that without a tap.
+    #[must_use]
+    pub fn gone(&self, now: Moment) -> Option<Gone> {
+        self.pulse.gone(now)
+    }
+
+    /// When the vehicle under test is silent for too long, if nothing comes before.
+    #[must_use]
+    pub fn falls_silent(&self) -> Option<Moment> {
+        self.pulse.falls_silent()
     }
 
     /// The subject of an entry.

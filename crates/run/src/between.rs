@@ -50,6 +50,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         };
         // A program that has ended does not come back by itself.
         let down = self.program_is_down();
+        let left = gone(&self.engine.recorder);
         let until = self.engine.link.now().moment + first;
         if down.is_none() && self.engine.watch(until, there).await? {
             return Ok(None);
@@ -57,8 +58,9 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         let why = match self.program_is_down() {
             Some(why) => format!("the device is gone: {why}"),
             None => format!(
-                "the device is gone: it did not come back within {}",
-                show_duration(self.time("reconnect"))
+                "the device is gone: it did not come back within {}{}",
+                show_duration(self.time("reconnect")),
+                left.map_or_else(String::new, |left| format!("; {left}"))
             ),
         };
         if !has_hook {
@@ -184,6 +186,12 @@ async fn off_and_on<L: Link, O: Operator>(session: &mut Session<'_, L, O>) -> Re
         "{missing} within {} after hook `power-cycle`",
         show_duration(waited)
     )))
+}
+
+/// How the device shows without a tap that it is gone.
+pub(super) fn gone(recorder: &Recorder) -> Option<String> {
+    let timeline = recorder.judge().timeline();
+    Some(timeline.gone(timeline.last()?.moment)?.to_string())
 }
 
 fn next_seq(recorder: &Recorder) -> u64 {

@@ -100,8 +100,45 @@ impl<'a> Estimate<'a> {
     }
 }
 
+/// How long a run will still take, by what was planned and by what this device has taken so far.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Outlook {
+    /// What the tests that are still to come were to take, and how many they are.
+    planned: Duration,
+    tests: u32,
+    /// What those that are over took more than planned, and how many they are.
+    more: Duration,
+    over: u32,
+}
+
+impl Outlook {
+    /// Before the first of so many tests.
+    pub(super) fn of(planned: Duration, tests: u32) -> Self {
+        Self {
+            planned,
+            tests,
+            ..Self::default()
+        }
+    }
+
+    /// One of the tests is over: what it was to take, and what it took with all that came after it.
+    pub(super) fn is_over(&mut self, planned: Duration, took: Duration) {
+        self.planned = self.planned.saturating_sub(planned);
+        self.tests = self.tests.saturating_sub(1);
+        self.more += took.saturating_sub(planned);
+        self.over += 1;
+    }
+
+    /// What is left.
+    pub(super) fn left(&self) -> Duration {
+        let each = self.more.checked_div(self.over).unwrap_or_default();
+        self.planned + each * self.tests
+    }
+}
+
 /// The estimate in words: no more exact than it is.
-pub(super) fn in_words(estimate: Duration) -> String {
+#[must_use]
+pub fn in_words(estimate: Duration) -> String {
     let seconds = estimate.as_secs();
     match seconds {
         0..=9 => "a few seconds".to_owned(),
@@ -131,6 +168,17 @@ mod tests {
         assert!(of(0.5, true) > of(2.0, true) * 2);
         assert!(of(2.0, true) > Duration::from_secs(30));
         assert_eq!(of(0.5, false), of(2.0, false));
+    }
+
+    #[test]
+    fn what_a_device_has_taken_so_far_corrects_what_is_left() {
+        let second = Duration::from_secs(1);
+        let mut outlook = Outlook::of(second * 10, 10);
+        assert_eq!(outlook.left(), second * 10);
+        outlook.is_over(second, second * 31);
+        assert_eq!(outlook.left(), second * (9 + 9 * 30));
+        outlook.is_over(second, second / 2);
+        assert_eq!(outlook.left(), second * (8 + 8 * 15));
     }
 
     #[test]

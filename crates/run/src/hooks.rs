@@ -225,7 +225,8 @@ fn answered(answer: Answer, within: Duration) -> HookOutcome {
         Answer::Done => HookOutcome::Done("the operator answered: done".to_owned()),
         Answer::Skip => HookOutcome::Skipped("the operator skipped the test".to_owned()),
         Answer::End => HookOutcome::Failed("the operator ended the run".to_owned()),
-        Answer::Silence => HookOutcome::Failed(format!("nobody answered within {}", show_duration(within))),
+        // Nobody has broken anything: the test is undecided.
+        Answer::Silence => HookOutcome::Skipped(format!("nobody answered within {}", show_duration(within))),
         Answer::GivenUp => HookOutcome::Failed("given up: the run ends".to_owned()),
         Answer::Unasked(why) => HookOutcome::Failed(format!("the operator could not be asked: {why}")),
     }

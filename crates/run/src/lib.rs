@@ -46,6 +46,7 @@ pub use bundle::{Bundle, BundleError, JOURNAL, write_whole};
 pub use capabilities::Capabilities;
 pub use discover::{Device, Heard, Position, listen};
 pub use draft::{Wishes, draft};
+pub use estimate::in_words;
 pub use header::HeaderParts;
 pub use latest::{LATEST, forget_latest, newest};
 pub use outputs::{OutputError, sources, write_all, write_result};

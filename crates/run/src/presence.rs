@@ -1,10 +1,12 @@
 //! Whether the device is there, as far as the harness can see.
 
+use std::time::Duration;
+
 use tck_engine::vehicle::{has_any_open_connection, has_open_connection};
 use tck_journal::Entry;
 use tck_journal::Vantage;
 use tck_journal::event::Event;
-use tck_judge::RunJudge;
+use tck_judge::{RunJudge, Sign};
 use tck_pack::Role;
 
 /// Whether the device is connected, as far as the harness can see.
@@ -32,7 +34,8 @@ impl Presence {
                     .of("state")
                     .last()
                     .is_some_and(|entry| !is_stale(entry));
-                if said.is_some() { state == online } else { fresh }
+                let there = if said.is_some() { state == online } else { fresh };
+                there && !is_silent(judge)
             }
         };
         if there { Self::There } else { Self::Away }
@@ -52,6 +55,16 @@ pub(super) fn says_online(judge: &RunJudge) -> bool {
     let state = said.json().and_then(|message| message.get("connectionState")?.as_str());
     state == judge.ground().pack.word("connection.online")
 }
+
+/// Whether the device has said nothing for longer than any may, and than it ever did.
+fn is_silent(judge: &RunJudge) -> bool {
+    let timeline = judge.timeline();
+    let gone = timeline.last().and_then(|last| timeline.gone(last.moment));
+    gone.is_some_and(|gone| matches!(gone.sign, Sign::Silent(long, _) if long > SILENT))
+}
+
+/// For so long no device may be silent.
+const SILENT: Duration = Duration::from_secs(31);
 
 /// Stored by the broker before the run began.
 pub(super) fn is_stale(entry: &Entry) -> bool {

@@ -7,14 +7,16 @@ use std::time::Duration;
 use serde_json::{Map, Value};
 use tokio::sync::watch;
 
+use super::between::gone;
 use super::bindings::{course_of, own_bindings};
 use super::capabilities::Capabilities;
 use super::draw::draw;
-use super::estimate::{self, Estimate};
+use super::estimate::{self, Estimate, Outlook};
 use super::presence::Presence;
 use super::rest::{Home, Obstacle};
 use super::risk::by_risk;
 use super::strikes::Strikes;
+use tck_base::clock::Moment;
 use tck_base::verdict::Verdict;
 use tck_course::Layout;
 use tck_engine::{Engine, EngineError, Operator, Recorder, Watcher};
@@ -97,6 +99,10 @@ pub trait Progress: Watcher {
     fn test_ended(&mut self, result: &TestResult);
     /// Something worth knowing.
     fn note(&mut self, text: &str);
+    /// So much of the run is left, as far as can be told now.
+    fn left(&mut self, left: Duration) {
+        let _ = left;
+    }
     /// The bench stands, and a device that is not ours is expected there.
     fn expects_device(&mut self, bench: &BenchInfo) {
         let _ = bench;
@@ -211,6 +217,9 @@ pub(super) struct Session<'a, L, O> {
     pub(super) ready_since: u64,
     /// Preconditions that are not reached again and again.
     strikes: Strikes,
+    /// What each of the tests was to take, and how long the run still takes; in virtual time nobody waits for it.
+    estimates: Vec<Duration>,
+    outlook: Outlook,
 }
 
 impl<'a, L: Link, O: Operator> Session<'a, L, O> {
@@ -231,6 +240,8 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             orders: 0,
             ready_since: 0,
             strikes: Strikes::default(),
+            estimates: Vec::new(),
+            outlook: Outlook::default(),
         }
     }
 
@@ -309,6 +320,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
                     Err(why) => plan.tests[at].gate = Gate::Unobservable(why),
                     Ok(own) => {
                         self.progress.test_begun(test, number, runs);
+                        let begun = self.engine.link.now().moment;
                         gone = self.run_and_restore(test, own, number).await?;
                         if let Some(result) = self.engine.recorder.judge().done().last() {
                             self.progress.test_ended(result);
@@ -316,6 +328,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
                                 failed = Some(result.id.clone());
                             }
                         }
+                        self.tell_left(at, begun);
                         saved(self.engine.recorder.judge());
                     }
                 }
@@ -367,12 +380,28 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             self.engine.operator.usual_time(),
         );
         let planned = self.setup.tests.iter().zip(&plan.tests);
-        let running = planned.filter(|(_, planned)| planned.gate == Gate::Runs);
-        let estimate = estimate.of_tests(running.map(|(test, _)| &**test));
+        let each = planned.map(|(test, planned)| match planned.gate {
+            Gate::Runs => Some(estimate.of_tests(std::iter::once(&**test))),
+            _ => None,
+        });
+        let each: Vec<Option<Duration>> = each.collect();
+        let runs = u32::try_from(each.iter().flatten().count()).unwrap_or(u32::MAX);
+        let planned = each.iter().flatten().sum::<Duration>() * self.setup.repeat;
+        self.outlook = Outlook::of(planned, runs * self.setup.repeat);
+        self.estimates = each.into_iter().map(Option::unwrap_or_default).collect();
         self.progress.note(&format!(
             "estimated time: {} (more if the device is slow)",
-            estimate::in_words(estimate)
+            estimate::in_words(self.outlook.left())
         ));
+    }
+
+    /// Says how much of the run is left, once a test is over that was begun then.
+    fn tell_left(&mut self, at: usize, begun: Moment) {
+        if let Some(planned) = self.estimates.get(at) {
+            let took = self.engine.link.now().moment.since(begun);
+            self.outlook.is_over(*planned, took);
+            self.progress.left(self.outlook.left());
+        }
     }
 
     fn plan(&self, tests: Vec<PlannedTest>) -> Plan {
@@ -416,7 +445,9 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         if Presence::of(self.engine.recorder.judge(), self.setup.capabilities.vantage).is_there() {
             return Ok(None);
         }
-        self.progress.note("the device is not connected; waiting for it");
+        let gone = gone(&self.engine.recorder);
+        let gone = gone.as_deref().unwrap_or("the device is not connected");
+        self.progress.note(&format!("{gone}; waiting for it"));
         self.revive().await
     }
 
@@ -539,5 +570,9 @@ struct AsWatcher<'a>(&'a mut dyn Progress);
 impl Watcher for AsWatcher<'_> {
     fn waiting(&mut self, step: &tck_suite::model::Step) {
         self.0.waiting(step);
+    }
+
+    fn gone(&mut self, how: &str) {
+        self.0.note(how);
     }
 }

@@ -148,6 +148,9 @@ pub struct Report {
     /// Derive all verdicts from the journal again and compare them; nothing is written
     #[arg(long, conflicts_with = "verify")]
     pub rejudge: bool,
+    /// Print one record of the journal with its message, by the number that a report gives it; nothing is written
+    #[arg(long, value_name = "N", conflicts_with_all = ["verify", "rejudge", "certificate", "attestation", "renderings", "compare"])]
+    pub message: Option<u64>,
     /// The root hash that the bundle must have, as a certificate names it
     #[arg(long, value_name = "sha256:HASH", requires = "verify", value_parser = parse_root)]
     pub root: Option<String>,
