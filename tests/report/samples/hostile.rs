@@ -171,7 +171,6 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
         protocol: evil(),
         partial: true,
         partial_reason: Some(evil()),
-            cause: None,
         device: DeviceIdentity {
             manufacturer: evil(),
             serial_number: evil(),
