@@ -4,8 +4,11 @@ use super::fields::{Fields, Problems, text_of, word_of};
 use super::model::{Recordings, Rule};
 use tck_base::diagnostic::Diagnostic;
 
+/// How a word becomes what it says.
+type Meaning = fn() -> Recordings;
+
 /// The words that stand without a reason.
-const WORDS: [(&str, fn() -> Recordings); 5] = [
+const WORDS: [(&str, Meaning); 5] = [
     ("message", || Recordings::Message),
     ("message-on-topic", || Recordings::MessageOnTopic),
     ("unbroken", || Recordings::Unbroken),
