@@ -232,6 +232,7 @@ mod tests {
             path: "steps[0]".to_owned(),
             title: None,
             spec: None,
+            purpose: None,
             verb,
             owes: false,
             prefers: false,

@@ -128,6 +128,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
             verdict,
             not_applicable: verdict.is_none().then(evil),
             seconds: f64::MAX,
+            cause: None,
             reason: Some(evil()),
             cause: None,
             maturity: "watchlist".to_owned(),
