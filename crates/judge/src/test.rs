@@ -550,17 +550,12 @@ impl TestJudge {
         self.result.verdict = self.verdict.get();
         let (reason, cause) = self.reason(why).unzip();
         self.result.cause = cause.flatten();
-<<<<<<< HEAD
         self.result.reason = match (reason, self.gone().map(Gone::to_string)) {
-=======
-        self.result.reason = match (reason, self.departure.story()) {
->>>>>>> facade
             (Some(reason), Some(story)) => Some(format!("{reason}; {story}")),
             (reason, story) => reason.or(story),
         };
     }
 
-<<<<<<< HEAD
     /// How the device left, of its own accord, in this test. That a device which passes is quiet at the end is no matter.
     fn gone(&self) -> Option<&Gone> {
         let passes = self.verdict.get() == Some(Verdict::Pass);
@@ -568,8 +563,6 @@ impl TestJudge {
         self.departure.story().or(silent)
     }
 
-=======
->>>>>>> facade
     /// Why the verdict is not a pass, and of which kind that is where more than the text tells.
     fn reason(&self, why: Reason) -> Option<(String, Option<Reason>)> {
         let verdict = self.verdict.get()?;
