@@ -130,7 +130,6 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
             seconds: f64::MAX,
             cause: None,
             reason: Some(evil()),
-            cause: None,
             maturity: "watchlist".to_owned(),
             maturity_note: Some(evil()),
             journal: Some((first, last)),
