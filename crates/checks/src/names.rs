@@ -45,7 +45,9 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
         let name = path.file_name().expect("name").to_string_lossy().into_owned();
         if path.is_dir() && name != "tests" {
             found.extend(sources(&path));
-        } else if name.ends_with(".rs") && !matches!(name.as_str(), "tests.rs" | "trace.rs" | "known_members.rs") {
+        } else if path.extension().is_some_and(|extension| extension == "rs")
+            && !matches!(name.as_str(), "tests.rs" | "trace.rs" | "known_members.rs")
+        {
             found.push(path);
         }
     }
