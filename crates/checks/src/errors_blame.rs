@@ -4,11 +4,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use serde_json::Value;
-
 use crate::finding::{broken, quote};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, text};
+use tck_view::{ActionState, ErrorView, Print, StateView};
 use tck_world::{Listen, Observation, Topic};
 
 /// How many actions, errors and references are looked at.
@@ -27,7 +25,7 @@ pub(super) const BLAME: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[],
-    needs: &[],
+    needs: &[StateView::errors, StateView::action_states],
     start: |_| Box::new(Blame::default()),
 };
 
@@ -36,7 +34,7 @@ struct Blame {
     /// Whether an order was sent since the last state.
     sent: bool,
     /// Errors of the last state.
-    listed: BTreeSet<String>,
+    listed: BTreeSet<Key>,
     /// actionIds that had FAILED in the last state; `None` before the first.
     failed: Option<BTreeSet<String>>,
 }
@@ -44,12 +42,14 @@ struct Blame {
 impl Running for Blame {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.sent |= record.is_to_vehicle(Topic::Order) || record.is_to_vehicle(Topic::InstantActions);
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
-        let statuses: BTreeMap<&str, &str> = elements(state, "actionStates")
+        let statuses: BTreeMap<&str, &str> = state
+            .action_states
+            .iter()
             .take(MANY)
-            .map(|action| (text(action, "actionId"), text(action, "actionStatus")))
+            .map(|action| (action.action_id.or_empty(), action.action_status.or_empty()))
             .collect();
         let has_failed = |id: &str| statuses.get(id) == Some(&"FAILED");
         let failed: BTreeSet<String> = statuses
@@ -57,7 +57,7 @@ impl Running for Blame {
             .filter(|id| has_failed(id))
             .map(|id| id.chars().take(512).collect())
             .collect();
-        let errors: Vec<&Value> = elements(state, "errors").take(MANY).collect();
+        let errors: Vec<&ErrorView> = state.errors.iter().take(MANY).collect();
         let before = std::mem::replace(&mut self.listed, errors.iter().map(|error| key(error)).collect());
         let known = self.failed.replace(failed);
         let sent = std::mem::take(&mut self.sent);
@@ -71,11 +71,11 @@ impl Running for Blame {
         if sent {
             return false;
         }
-        let named = |error: &Value| -> Vec<String> {
-            elements(error, "errorReferences")
-                .take(MANY)
-                .filter(|reference| text(reference, "referenceKey") == "actionId")
-                .map(|reference| text(reference, "referenceValue").to_owned())
+        let named = |error: &ErrorView| -> Vec<String> {
+            let references = error.error_references.iter().take(MANY);
+            references
+                .filter(|reference| reference.key.is(ActionState::action_id.usual_name()))
+                .map(|reference| reference.value.or_empty().to_owned())
                 .collect()
         };
         let fresh: Vec<Vec<String>> = errors
@@ -106,10 +106,13 @@ impl Running for Blame {
     }
 }
 
-fn key(error: &Value) -> String {
-    let references = error.get("errorReferences").map(Value::to_string);
-    let key = format!("{} {}", text(error, "errorType"), references.unwrap_or_default());
-    key.chars().take(2048).collect()
+/// Type and references of an error: by these it is known again.
+type Key = (String, Vec<Print>);
+
+fn key(error: &ErrorView) -> Key {
+    let references = error.error_references.iter().take(MANY);
+    let references = references.map(|reference| reference.print).collect();
+    (error.error_type.or_empty().to_owned(), references)
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::finding::{broken, remark};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, text};
+use tck_view::{ErrorView, Print, StateView};
 use tck_world::{Listen, Observation, Seen, Topic};
 
 /// How many errors of a state, and texts of what was sent, are looked at.
@@ -24,7 +24,7 @@ pub(super) const ON_EVENT: Check = Check {
     arguments: &[],
     listens: &[Listen::AnySent, Listen::Delivered(Topic::State)],
     reads: &[],
-    needs: &[],
+    needs: &[StateView::errors],
     start: |_| Box::new(OnEvent::default()),
 };
 
@@ -33,18 +33,19 @@ struct OnEvent {
     /// When the last message was sent, and the texts in it.
     stimulus: Option<(Moment, BTreeSet<String>)>,
     /// Errors of the last state before it, and of the last state: type, level, references.
-    before: Vec<String>,
-    latest: Vec<String>,
+    before: Vec<Key>,
+    latest: Vec<Key>,
     judged: bool,
 }
 
-fn key(error: &Value) -> String {
-    let references = error.get("errorReferences").map(Value::to_string);
-    format!(
-        "{} {} {}",
-        text(error, "errorType"),
-        text(error, "errorLevel"),
-        references.unwrap_or_default()
+/// Type, level and references of an error: by these it is known again.
+type Key = (String, String, Vec<Print>);
+
+fn key(error: &ErrorView) -> Key {
+    (
+        error.error_type.or_empty().to_owned(),
+        error.error_level.or_empty().to_owned(),
+        error.error_references.iter().map(|reference| reference.print).collect(),
     )
 }
 
@@ -84,17 +85,20 @@ impl Running for OnEvent {
             self.before.clone_from(&self.latest);
             self.judged = false;
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
-        let errors: Vec<&Value> = elements(state, "errors").take(MANY).collect();
+        let errors: Vec<&ErrorView> = state.errors.iter().take(MANY).collect();
         self.latest = errors.iter().copied().map(key).collect();
         let Some((since, sent)) = self.stimulus.as_ref().filter(|_| !self.judged) else {
             return false;
         };
-        let answers = |error: &&&Value| {
-            let mut named = elements(error, "errorReferences").map(|reference| text(reference, "referenceValue"));
-            is_refusal(text(error, "errorType"), context) || named.any(|named| sent.contains(named))
+        let answers = |error: &&&ErrorView| {
+            let mut named = error
+                .error_references
+                .iter()
+                .map(|reference| reference.value.or_empty());
+            is_refusal(error.error_type.or_empty(), context) || named.any(|named| sent.contains(named))
         };
         let mut new = errors.iter().filter(|error| !self.before.contains(&key(error)));
         if !new.any(|error| answers(&error)) {

@@ -5,12 +5,10 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use serde_json::Value;
-
 use crate::finding::{broken, quote, remark};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{actions, elements, number, text};
+use tck_view::{ActionView, MessageView, StateView};
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// How many actions are kept in mind, and how many one message may have to be judged.
@@ -36,7 +34,7 @@ pub(super) const ANSWERED: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
-    needs: &[],
+    needs: &[StateView::action_states],
     start: |_| Box::new(Answered::looking_for("IACT-03")),
 };
 
@@ -58,7 +56,7 @@ pub(super) const TOGETHER: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
-    needs: &[],
+    needs: &[StateView::action_states],
     start: |_| Box::new(Answered::looking_for("IACT-07")),
 };
 
@@ -81,7 +79,7 @@ pub(super) const BEGINS: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
-    needs: &[],
+    needs: &[StateView::action_states],
     start: |_| Box::new(Answered::looking_for("IACT-05")),
 };
 
@@ -103,7 +101,7 @@ pub(super) const SCOPE: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
-    needs: &[],
+    needs: &[StateView::action_states],
     start: |_| Box::new(Answered::looking_for("ACT-10")),
 };
 
@@ -164,23 +162,20 @@ impl Answered {
 
     fn learn(&mut self, record: &Observation<'_>, context: &CheckContext<'_>) {
         if record.is_delivered(Topic::Factsheet) {
-            let listed = record
-                .json()
-                .and_then(|sheet| sheet.pointer("/protocolFeatures/agvActions")?.as_array());
+            let sheet = record.message().and_then(MessageView::factsheet);
+            let listed = sheet.into_iter().flat_map(|sheet| sheet.offered_actions());
             let instant = listed
-                .into_iter()
-                .flatten()
                 .take(ACTIONS)
-                .filter(|action| elements(action, "actionScopes").any(|scope| scope.as_str() == Some("INSTANT")));
-            self.offered = instant.map(|action| text(action, "actionType").to_owned()).collect();
+                .filter(|action| action.action_scopes.texts().any(|scope| scope == "INSTANT"));
+            self.offered = instant.map(|action| action.action_type.or_empty().to_owned()).collect();
         }
-        let Some(message) = record.to_vehicle_json(Topic::InstantActions) else {
+        let (Some(document), Some(message)) = (record.json(), record.instant_actions_to_vehicle()) else {
             return;
         };
         let schema = context.pack.schema("instantActions");
-        let obeys = schema.is_none_or(|schema| schema.findings(message).is_empty());
-        let all: Vec<&Value> = actions(message).collect();
-        let id = |action: &Value| text(action, "actionId").chars().take(512).collect::<String>();
+        let obeys = schema.is_none_or(|schema| schema.findings(document).is_empty());
+        let all: Vec<&ActionView> = message.all_actions().collect();
+        let id = |action: &ActionView| action.action_id.or_empty().to_owned();
         let fresh = |at: usize| {
             let own = id(all[at]);
             !own.is_empty() && !self.asked.contains_key(&own) && all[..at].iter().all(|other| id(other) != own)
@@ -195,7 +190,7 @@ impl Answered {
             let asked = Asked {
                 message: record.seq(),
                 at: record.at().moment,
-                kind: text(action, "actionType").to_owned(),
+                kind: action.action_type.or_empty().to_owned(),
                 states: 0,
                 listed: false,
                 waits: None,
@@ -258,7 +253,7 @@ impl Answered {
 
     fn listed(
         &mut self,
-        state: &Value,
+        state: &StateView,
         now: Moment,
         seq: u64,
         context: &CheckContext<'_>,
@@ -266,17 +261,19 @@ impl Answered {
         findings: &mut Vec<CheckFinding>,
     ) {
         let (slow, react) = limits;
-        let busy = elements(state, "actionStates")
+        let busy = state
+            .action_states
+            .iter()
             .take(ACTIONS)
-            .any(|action| active(text(action, "actionStatus")))
-            || state.get("driving").and_then(Value::as_bool) != Some(false);
-        for action in elements(state, "actionStates").take(ACTIONS) {
-            let Some(asked) = self.asked.get_mut(text(action, "actionId")) else {
+            .any(|action| active(action.action_status.or_empty()))
+            || !state.driving.is(false);
+        for action in state.action_states.iter().take(ACTIONS) {
+            let Some(asked) = self.asked.get_mut(action.action_id.or_empty()) else {
                 continue;
             };
             asked.listed = true;
-            let status = text(action, "actionStatus");
-            let id = quote(text(action, "actionId"));
+            let status = action.action_status.or_empty();
+            let id = quote(action.action_id.or_empty());
             let performed = active(status) || status == "FINISHED";
             if performed && !asked.told && is_misplaced(&asked.kind, context) && !self.offered.contains(&asked.kind) {
                 asked.told = true;
@@ -328,14 +325,14 @@ impl Running for Answered {
         if restarted || record.link.disturbed || record.outside_influence() {
             self.asked.clear();
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
-        if !state.get("actionStates").is_some_and(Value::is_array) || self.asked.is_empty() {
+        if !state.action_states.is_there() || self.asked.is_empty() {
             return false;
         }
-        let order = text(state, "orderId").chars().take(512).collect();
-        let order = (order, number(state, "orderUpdateId").unwrap_or_default());
+        let order = state.order_id.or_empty().to_owned();
+        let order = (order, state.order_update_id.whole().unwrap_or_default());
         let before = self.order.replace(order.clone());
         let renewed = before.is_some_and(|before| before.0 != order.0);
         let slow = context.time.slow;

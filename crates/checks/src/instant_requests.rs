@@ -3,12 +3,10 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use serde_json::Value;
-
 use crate::finding::{broken, quote, remark};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{actions, elements, text};
+use tck_view::StateView;
 use tck_world::{Fact, Listen, Observation, Seen, Topic};
 
 /// How many requests are kept in mind.
@@ -35,7 +33,7 @@ pub(super) const REQUESTS_MET: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
-    needs: &[],
+    needs: &[StateView::action_states],
     start: |_| Box::new(Requests::default()),
 };
 
@@ -49,19 +47,17 @@ struct Requests {
 
 impl Requests {
     fn learn(&mut self, record: &Observation<'_>, context: &CheckContext<'_>) {
-        let Some(message) = record
-            .to_vehicle_json(Topic::InstantActions)
-            .filter(|_| !record.link.disturbed)
-        else {
+        let message = record.instant_actions_to_vehicle();
+        let (Some(document), Some(message)) = (record.json(), message.filter(|_| !record.link.disturbed)) else {
             return;
         };
         let schema = context.pack.schema("instantActions");
-        if schema.is_some_and(|schema| !schema.findings(message).is_empty()) {
+        if schema.is_some_and(|schema| !schema.findings(document).is_empty()) {
             return;
         }
-        for action in actions(message).take(REQUESTS) {
-            let id: String = text(action, "actionId").chars().take(512).collect();
-            match text(action, "actionType") {
+        for action in message.all_actions().take(REQUESTS) {
+            let id = action.action_id.or_empty().to_owned();
+            match action.action_type.or_empty() {
                 "stateRequest" if self.states.len() < REQUESTS => {
                     self.states.entry(id).or_insert((record.at().moment, None));
                 }
@@ -75,7 +71,7 @@ impl Requests {
 
     fn state_came(
         &mut self,
-        state: &Value,
+        state: &StateView,
         record: &Observation<'_>,
         context: &CheckContext<'_>,
         findings: &mut Vec<CheckFinding>,
@@ -86,8 +82,8 @@ impl Requests {
         for (since, came) in self.states.values_mut() {
             came.get_or_insert((now.since(*since), record.seq()));
         }
-        for action in elements(state, "actionStates").take(REQUESTS * 4) {
-            let (id, status) = (text(action, "actionId"), text(action, "actionStatus"));
+        for action in state.action_states.iter().take(REQUESTS * 4) {
+            let (id, status) = (action.action_id.or_empty(), action.action_status.or_empty());
             if !matches!(status, "FINISHED" | "FAILED") {
                 continue;
             }
@@ -153,7 +149,7 @@ impl Running for Requests {
         if record.is(Seen::Delivered, Topic::Factsheet) || record.is(Seen::Stored, Topic::Factsheet) {
             self.sheets.clear();
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
         let judged = !self.states.is_empty() || !self.sheets.is_empty();

@@ -38,6 +38,8 @@ mod message;
 mod motion;
 mod motion_signs;
 mod mqtt;
+#[cfg(test)]
+mod names;
 mod rhythm;
 mod state;
 mod topic;

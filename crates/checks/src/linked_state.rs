@@ -12,7 +12,7 @@ use crate::finding::{broken, quote, show};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::Event;
-use tck_world::members::{actions, elements, text};
+use tck_view::{ActionState, ActionView, Json, Member, Number, StateView};
 use tck_world::{Fact, Listen, Observation, Topic, sets_position};
 
 /// How many actions are kept in mind.
@@ -55,7 +55,7 @@ pub(super) const LINKED_STATE: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
-    needs: &[],
+    needs: &[StateView::action_states, StateView::driving, StateView::safety_state],
     start: |_| Box::new(Linked::default()),
 };
 
@@ -63,7 +63,7 @@ pub(super) const LINKED_STATE: Check = Check {
 #[derive(Clone)]
 struct Known {
     kind: String,
-    action: Value,
+    action: ActionView,
     /// The entry it was sent with.
     seq: u64,
 }
@@ -129,44 +129,32 @@ fn touched(record: &Observation<'_>) -> &'static [&'static str] {
 }
 
 /// Whether the state shows nothing that may hold the vehicle, or let somebody else act on it.
-fn nothing_holds(state: &Value) -> bool {
-    let safety = |name: &str| state.get("safetyState").and_then(|safety| safety.get(name));
-    matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC")
-        && safety("eStop").and_then(Value::as_str) == Some("NONE")
-        && safety("fieldViolation") == Some(&Value::Bool(false))
-        && elements(state, "errors").all(|error| text(error, "errorLevel") == "WARNING")
-}
-
-fn parameter<'v>(action: &'v Value, key: &str) -> Option<&'v Value> {
-    elements(action, "actionParameters")
-        .find(|parameter| text(parameter, "key") == key)?
-        .get("value")
+fn nothing_holds(state: &StateView) -> bool {
+    matches!(state.operating_mode.or_empty(), "AUTOMATIC" | "SEMIAUTOMATIC")
+        && state.emergency_stop() == Some("NONE")
+        && state.field_violation() == Some(false)
+        && state.errors.iter().all(|error| error.error_level.is("WARNING"))
 }
 
 impl Linked {
     fn learn(&mut self, record: &Observation<'_>) {
-        let instant = record
-            .to_vehicle_json(Topic::InstantActions)
-            .into_iter()
-            .flat_map(actions);
-        let order = record.to_vehicle_json(Topic::Order);
+        let instant = record.instant_actions_to_vehicle().into_iter();
+        let instant = instant.flat_map(|message| message.all_actions());
+        let order = record.order_to_vehicle();
         if order.is_some() {
             self.ordered = record.seq();
         }
-        let placed = order
-            .into_iter()
-            .flat_map(|order| elements(order, "nodes").chain(elements(order, "edges")))
-            .flat_map(|element| elements(element, "actions"));
-        let placed: Vec<&Value> = placed.take(ACTIONS).collect();
+        let placed = order.into_iter().flat_map(|order| order.actions());
+        let placed: Vec<&ActionView> = placed.map(|(_, action)| action).take(ACTIONS).collect();
         for action in &placed {
             if self.placed.len() >= ACTIONS {
                 self.placed.clear();
             }
-            self.placed.insert(text(action, "actionId").chars().take(512).collect());
+            self.placed.insert(action.action_id.or_empty().to_owned());
         }
         for action in instant.chain(placed).take(ACTIONS) {
-            let kind = text(action, "actionType");
-            let id: String = text(action, "actionId").chars().take(512).collect();
+            let kind = action.action_type.or_empty();
+            let id = action.action_id.or_empty().to_owned();
             if topic(kind).is_none() || id.is_empty() {
                 continue;
             }
@@ -184,77 +172,75 @@ impl Linked {
     }
 
     /// Which actions of the order are not over although its cancellation is.
-    fn outlive(&self, cancel: &Known, state: &Value) -> Vec<(&'static str, String)> {
+    fn outlive(&self, cancel: &Known, state: &StateView) -> Vec<(&'static str, String)> {
         // Those of an order that was sent since may wait already.
         if self.ordered > cancel.seq {
             return Vec::new();
         }
-        let placed = |action: &&Value| self.placed.contains(text(action, "actionId"));
-        let open = |action: &&Value| !matches!(text(action, "actionStatus"), "FINISHED" | "FAILED");
-        let waits = |action: &&Value| text(action, "actionStatus") == "WAITING";
-        let left = elements(state, "actionStates")
-            .take(ACTIONS)
-            .filter(placed)
-            .filter(open);
+        let placed = |action: &&ActionState| self.placed.contains(action.action_id.or_empty());
+        let open = |action: &&ActionState| !action.is_over();
+        let waits = |action: &&ActionState| action.action_status.is("WAITING");
+        let left = state.action_states.iter().take(ACTIONS).filter(placed).filter(open);
         // One that runs rather than one that waits.
         let Some(action) = left.min_by_key(waits) else {
             return Vec::new();
         };
         let what = format!(
             "action {} of the order is {}",
-            quote(text(action, "actionId")),
-            text(action, "actionStatus")
+            quote(action.action_id.or_empty()),
+            action.action_status.or_empty()
         );
         let still_running = (!waits(&action)).then(|| ("ORD-CANCEL-06", what.clone()));
         still_running.into_iter().chain([("ORD-CANCEL-07", what)]).collect()
     }
 
     /// What is wrong in the state that shows the end of an action.
-    fn contradiction(known: &Known, state: &Value) -> Vec<(&'static str, String)> {
-        let flag = |path: &str| state.pointer(path).and_then(Value::as_bool);
-        let wants = |requirement, path: &str, wanted: bool| {
-            let wrong = flag(path).is_some_and(|flag| flag != wanted);
-            wrong.then(|| (requirement, format!("{} is {}", path[1..].replace('/', "."), !wanted)))
+    fn contradiction(known: &Known, state: &StateView, record: &Observation<'_>) -> Vec<(&'static str, String)> {
+        let wants = |requirement, what: &str, shown: Option<bool>, wanted: bool| {
+            let wrong = shown.is_some_and(|shown| shown != wanted);
+            wrong.then(|| (requirement, format!("{what} is {}", !wanted)))
         };
+        let paused = |wanted| wants("ACT-13", "paused", state.paused.flag(), wanted);
+        let charging = |wanted| wants("ACT-19", "batteryState.charging", state.charging(), wanted);
         // Who shows a velocity of nothing stands, whatever the flag says; then it is the flag that is wrong.
-        let speed = |name: &str| state.pointer(name).and_then(Value::as_f64);
-        let stands = speed("/velocity/vx") == Some(0.0)
-            && ["/velocity/vy", "/velocity/omega"]
-                .iter()
-                .all(|name| speed(name).is_none_or(|speed| speed == 0.0));
+        let stands = state.velocity.there().is_some_and(|velocity| {
+            let mut others = [&velocity.vy, &velocity.omega]
+                .into_iter()
+                .filter_map(Member::<Number>::float);
+            velocity.vx.float() == Some(0.0) && others.all(|speed| speed == 0.0)
+        });
         let drives = |requirement| {
             let requirement = if stands { "STATE-MSG-08" } else { requirement };
-            (flag("/driving") == Some(true)).then(|| (requirement, "driving is true".to_owned()))
+            state
+                .driving
+                .is(true)
+                .then(|| (requirement, "driving is true".to_owned()))
         };
         let left = || {
-            let count = elements(state, "nodeStates")
-                .chain(elements(state, "edgeStates"))
-                .count();
+            let count = state.node_states.total() + state.edge_states.total();
             (count > 0).then(|| ("ORD-CANCEL-11", format!("{count} node and edge states are left")))
         };
         let found = match known.kind.as_str() {
-            "startPause" if flag("/driving") == Some(true) => drives("ACT-15"),
+            "startPause" if state.driving.is(true) => drives("ACT-15"),
             "cancelOrder" => return left().into_iter().chain(drives("ORD-CANCEL-07")).collect(),
-            "startPause" => wants("ACT-13", "/paused", true),
-            "stopPause" => wants("ACT-13", "/paused", false),
-            "startCharging" => wants("ACT-19", "/batteryState/charging", true),
-            "stopCharging" => wants("ACT-19", "/batteryState/charging", false),
+            "startPause" => paused(true),
+            "stopPause" => paused(false),
+            "startCharging" => charging(true),
+            "stopCharging" => charging(false),
             "enableMap" => Self::maps(&known.action, state),
-            _ => return Self::pose(&known.action, state),
+            _ => return Self::pose(&known.action, state, record),
         };
         found.into_iter().collect()
     }
 
-    fn maps(action: &Value, state: &Value) -> Option<(&'static str, String)> {
-        let maps = state.get("maps")?.as_array()?;
-        let (map, version) = (
-            parameter(action, "mapId")?.as_str()?,
-            parameter(action, "mapVersion")?.as_str()?,
-        );
-        let of_map = maps.iter().filter(|listed| text(listed, "mapId") == map);
+    fn maps(action: &ActionView, state: &StateView) -> Option<(&'static str, String)> {
+        let maps = state.maps.there()?;
+        let word = |key: &str| action.parameter(key).and_then(Json::text);
+        let (map, version) = (word("mapId")?, word("mapVersion")?);
+        let of_map = maps.iter().filter(|listed| listed.map_id.or_empty() == map);
         let enabled: Vec<&str> = of_map
-            .filter(|listed| text(listed, "mapStatus") == "ENABLED")
-            .map(|listed| text(listed, "mapVersion"))
+            .filter(|listed| listed.map_status.is("ENABLED"))
+            .map(|listed| listed.map_version.or_empty())
             .collect();
         (enabled != [version]).then(|| {
             let what = match enabled.first() {
@@ -265,16 +251,12 @@ impl Linked {
         })
     }
 
-    fn pose(action: &Value, state: &Value) -> Vec<(&'static str, String)> {
+    fn pose(action: &ActionView, state: &StateView, record: &Observation<'_>) -> Vec<(&'static str, String)> {
         let mut found = Vec::new();
-        let number = |key: &str| parameter(action, key).and_then(Value::as_f64);
-        let given = (
-            number("x"),
-            number("y"),
-            number("theta"),
-            parameter(action, "mapId").and_then(Value::as_str),
-        );
-        if let ((Some(x), Some(y), Some(theta), Some(map)), Some(shown)) = (given, Pose::of(state)) {
+        let coordinate = |key: &str| action.parameter(key).and_then(Json::number).map(Number::float);
+        let word = |key: &str| action.parameter(key).and_then(Json::text);
+        let given = (coordinate("x"), coordinate("y"), coordinate("theta"), word("mapId"));
+        if let ((Some(x), Some(y), Some(theta), Some(map)), Some(shown)) = (given, Pose::of(&state.position)) {
             let given = Pose {
                 map: map.to_owned(),
                 x,
@@ -283,17 +265,21 @@ impl Linked {
             };
             let (far, turned) = shown.apart(&given);
             if shown.map != given.map || far > BESIDE.0 || turned > BESIDE.1 {
+                let names = record.names();
+                let message = record.json();
+                let position = message.and_then(|message| names.raw(message, &[StateView::position]));
                 let text = format!(
-                    "agvPosition is {} and not x {x}, y {y}, theta {theta} on {}",
-                    show(state.get("agvPosition").unwrap_or(&Value::Null)),
+                    "{} is {} and not x {x}, y {y}, theta {theta} on {}",
+                    names.name(StateView::position).unwrap_or_default(),
+                    show(position.unwrap_or(&Value::Null)),
                     quote(map)
                 );
                 found.push(("ACT-23", text));
             }
         }
-        let node = parameter(action, "lastNodeId").and_then(Value::as_str);
-        if let Some(node) = node.filter(|node| !node.is_empty() && text(state, "lastNodeId") != *node) {
-            let shown = quote(text(state, "lastNodeId"));
+        let last = state.last_node_id.or_empty();
+        if let Some(node) = word("lastNodeId").filter(|node| !node.is_empty() && last != *node) {
+            let shown = quote(last);
             found.push(("ACT-24", format!("lastNodeId is {shown} and not {}", quote(node))));
         }
         found
@@ -314,18 +300,20 @@ impl Running for Linked {
         if context.world.restarts().now(record) {
             self.order = None;
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
-        let order: String = text(state, "orderId").chars().take(512).collect();
+        let order = state.order_id.or_empty().to_owned();
         let same_order = self.order.as_ref() == Some(&order);
         let begun = self.order.replace(order).is_some();
         let now = record.at().moment;
         let left_alone = |topic| self.touched.get(topic).is_none_or(|at| now.since(*at) > INFLUENCE);
-        let still = state.get("driving").and_then(Value::as_bool) == Some(false);
-        let listed: Vec<(&str, &str)> = elements(state, "actionStates")
+        let still = state.driving.is(false);
+        let listed: Vec<(&str, &str)> = state
+            .action_states
+            .iter()
             .take(ACTIONS)
-            .map(|action| (text(action, "actionId"), text(action, "actionStatus")))
+            .map(|action| (action.action_id.or_empty(), action.action_status.or_empty()))
             .filter(|(id, _)| self.known.contains_key(*id))
             .collect();
         // What has ended before, or only waits, changes nothing now.
@@ -363,7 +351,7 @@ impl Running for Linked {
                 "cancelOrder" => self.outlive(known, state),
                 _ => Vec::new(),
             };
-            for (requirement, text) in Self::contradiction(known, state).into_iter().chain(outlive) {
+            for (requirement, text) in Self::contradiction(known, state, record).into_iter().chain(outlive) {
                 let text = format!("{} {} is FINISHED, and {text}", known.kind, quote(id));
                 findings.push(broken(requirement, record.seq(), text));
             }

@@ -5,12 +5,11 @@
 use std::time::Duration;
 use tck_journal::event::Event;
 
-use serde_json::Value;
-
 use super::state::driving::Pose;
 use crate::finding::broken;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_view::{Member, MessageView, Number, Position, StateView, Velocity};
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// Messages further apart may leave out a stop or a turn between them.
@@ -46,7 +45,7 @@ pub(super) const VELOCITY_AXES: Check = Check {
         Listen::Delivered(Topic::Visualization),
     ],
     reads: &[Fact::Displaced],
-    needs: &[],
+    needs: &[StateView::position, StateView::velocity],
     start: |_| Box::new(Signs::new(axes, "MAP-03").of_straight_ways()),
 };
 
@@ -68,7 +67,7 @@ pub(super) const TURN_SIGN: Check = Check {
         Listen::Delivered(Topic::Visualization),
     ],
     reads: &[Fact::Displaced],
-    needs: &[],
+    needs: &[StateView::position, StateView::velocity],
     start: |_| Box::new(Signs::new(turn, "MAP-01")),
 };
 
@@ -83,20 +82,15 @@ struct Seen {
 }
 
 impl Seen {
-    fn read(at: Moment, message: &Value) -> Option<Self> {
-        let velocity = message.get("velocity")?;
-        let member = |name| {
-            velocity
-                .get(name)
-                .and_then(Value::as_f64)
-                .filter(|number| number.abs() < 1e6)
-        };
+    fn read(at: Moment, position: &Member<Position>, velocity: &Member<Velocity>) -> Option<Self> {
+        let velocity = velocity.there()?;
+        let sane = |member: &Member<Number>| member.float().filter(|number| number.abs() < 1e6);
         Some(Self {
             at,
-            pose: Pose::of(message)?,
-            vx: member("vx")?,
-            vy: member("vy").unwrap_or_default(),
-            omega: member("omega").unwrap_or_default(),
+            pose: Pose::of(position)?,
+            vx: sane(&velocity.vx)?,
+            vy: sane(&velocity.vy).unwrap_or_default(),
+            omega: sane(&velocity.omega).unwrap_or_default(),
         })
     }
 }
@@ -215,24 +209,23 @@ impl Running for Signs {
             self.state = None;
             self.visualization = None;
         }
-        let Some(name) = record.delivered().map(|message| message.name) else {
-            return false;
+        let shown = match record.message() {
+            Some(MessageView::State(state)) => Some((&state.position, &state.velocity)),
+            Some(MessageView::Visualization(message)) => Some((&message.position, &message.velocity)),
+            _ => None,
         };
-        if !matches!(name, "state" | "visualization") {
-            return false;
-        }
         if self.straight
-            && let Some(pose) = record.json().and_then(Pose::of)
+            && let Some(pose) = shown.and_then(|(position, _)| Pose::of(position))
+            && record.delivered().is_some()
         {
             self.forget_before_corner(&pose);
         }
-        let before = match name {
-            "state" => &mut self.state,
-            _ => &mut self.visualization,
+        let before = match record.delivered().map(|message| message.topic) {
+            Some(Topic::State) => &mut self.state,
+            Some(Topic::Visualization) => &mut self.visualization,
+            _ => return false,
         };
-        let now = record
-            .json()
-            .and_then(|message| Seen::read(record.at().moment, message));
+        let now = shown.and_then(|(position, velocity)| Seen::read(record.at().moment, position, velocity));
         let then = std::mem::replace(before, now.clone());
         let (Some(then), Some(now)) = (then, now) else {
             return false;

@@ -7,6 +7,7 @@ use super::rhythm::Rhythm;
 use crate::finding::{broken, remark};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_view::MessageView;
 use tck_world::{Listen, Observation, Topic};
 
 /// `visualization/rate`.
@@ -141,9 +142,8 @@ impl Running for Rate {
         };
         match message.name {
             "factsheet" => {
-                let interval = record
-                    .json()
-                    .and_then(|value| value.pointer("/protocolLimits/timing/visualizationInterval")?.as_f64());
+                let sheet = record.message().and_then(MessageView::factsheet);
+                let interval = sheet.and_then(|sheet| sheet.timing()?.visualization_interval.float());
                 self.stated = interval
                     .filter(|seconds| (0.01..=60.0).contains(seconds))
                     .map(Duration::from_secs_f64);

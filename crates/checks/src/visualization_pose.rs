@@ -5,12 +5,11 @@
 use std::time::Duration;
 use tck_journal::event::Event;
 
-use serde_json::Value;
-
 use super::state::driving::Pose;
 use crate::finding::{broken, remark};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_view::{StateView, VisualizationView};
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// How far it may be from the states of a vehicle at rest, in metres and radians.
@@ -43,7 +42,7 @@ pub(super) const POSITION: Check = Check {
         Listen::Delivered(Topic::Visualization),
     ],
     reads: &[Fact::Displaced],
-    needs: &[],
+    needs: &[StateView::position, VisualizationView::position],
     start: |_| Box::new(Position::default()),
 };
 
@@ -142,9 +141,9 @@ impl Running for Position {
             self.on_the_way.clear();
         }
         let now = record.at().moment;
-        if let Some(state) = record.state_json() {
-            let pose = Pose::of(state).filter(|_| state.get("driving") == Some(&Value::Bool(false)));
-            let seen = Pose::of(state);
+        if let Some(state) = record.state() {
+            let pose = Pose::of(&state.position).filter(|_| state.driving.is(false));
+            let seen = Pose::of(&state.position);
             self.known = seen.is_some();
             let measured = self.measure(seen.as_ref(), findings);
             self.last = seen;
@@ -158,14 +157,10 @@ impl Running for Position {
                 }
             };
         }
-        let message = record.delivered();
-        if message.is_none_or(|message| message.name != "visualization") {
-            return false;
-        }
-        let Some(value) = record.json().filter(|value| value.is_object()) else {
+        let Some(message) = record.visualization() else {
             return false;
         };
-        if value.get("agvPosition").is_none() {
+        if message.position.is_absent() {
             self.without += u32::from(self.known);
             if self.without == 2 {
                 let text = "the visualization has no agvPosition, although the states have one";
@@ -173,11 +168,11 @@ impl Running for Position {
             }
             return self.known;
         }
-        if let Some(pose) = Pose::of(value).filter(|_| self.on_the_way.len() < WAITING) {
+        if let Some(pose) = Pose::of(&message.position).filter(|_| self.on_the_way.len() < WAITING) {
             self.on_the_way.push((record.seq(), pose));
         }
         let stood = self.stood.as_ref().is_some_and(|(at, _)| now.since(*at) > OVERTAKING);
-        if let Some(pose) = Pose::of(value).filter(|_| stood && self.since.len() < WAITING) {
+        if let Some(pose) = Pose::of(&message.position).filter(|_| stood && self.since.len() < WAITING) {
             self.since.push((record.seq(), pose));
         }
         false

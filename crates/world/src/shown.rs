@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-use crate::members::{actions, elements, number, text};
+use crate::members::{elements, text};
 use crate::observation::Observation;
 use crate::orders::sets_position;
-use tck_view::{StateView, Topic};
+use tck_view::{ActionState, ErrorView, Print, StateView};
 
 /// How many FATAL errors are kept in mind.
 const ERRORS: usize = 16;
@@ -24,9 +24,9 @@ pub struct ShownOrder {
     carried: Option<(String, u64)>,
     last: Option<(String, u64)>,
     /// FATAL errors of the last state.
-    fatal: Vec<Value>,
+    fatal: Vec<Print>,
     /// Those among them with which the vehicle has taken the present order over all the same: they do not hold it.
-    borne: Vec<Value>,
+    borne: Vec<Print>,
     /// The last record that can be held against its order.
     held: Option<u64>,
 }
@@ -66,30 +66,28 @@ impl ShownOrder {
 impl ShownOrder {
     /// Learns from the next record.
     pub(crate) fn learn(&mut self, record: &Observation<'_>) {
-        let moved = record.to_vehicle_json(Topic::InstantActions).is_some_and(|message| {
-            actions(message).any(|action| {
-                let name = text(action, "actionType");
+        let moved = record.instant_actions_to_vehicle().is_some_and(|message| {
+            message.all_actions().any(|action| {
+                let name = action.action_type.or_empty();
                 name == "cancelOrder" || sets_position(name)
             })
         });
         if moved || record.outside_influence() {
             self.abandoned.clone_from(&self.order);
         }
-        let Some(state) = record.state_json() else { return };
-        let (Some(order), Some(last)) = (state.get("orderId").and_then(Value::as_str), last_node(state)) else {
+        let Some(state) = record.state() else { return };
+        let (Some(order), Some(last)) = (state.order_id.text(), last_node(state)) else {
             return;
         };
         if self.order.as_deref() != Some(order) {
             self.carried = self.last.take();
-            self.order = Some(order.chars().take(512).collect());
+            self.order = Some(order.to_owned());
             self.turn += 1;
             self.abandoned = None;
-            self.borne = fatal_errors(state)
-                .filter(|error| self.fatal.contains(error))
-                .cloned()
-                .collect();
+            let fatal = fatal_errors(state).map(|error| error.print);
+            self.borne = fatal.filter(|error| self.fatal.contains(error)).collect();
         }
-        self.fatal = fatal_errors(state).take(ERRORS).cloned().collect();
+        self.fatal = fatal_errors(state).map(|error| error.print).take(ERRORS).collect();
         if self.carried.as_ref().is_some_and(|carried| *carried != last) {
             self.carried = None;
         }
@@ -105,41 +103,45 @@ impl ShownOrder {
 
 /// Where a state says the vehicle was last: node and sequenceId.
 #[must_use]
-pub fn last_node(state: &Value) -> Option<(String, u64)> {
-    let node = state.get("lastNodeId")?.as_str()?;
-    Some((node.chars().take(512).collect(), number(state, "lastNodeSequenceId")?))
+pub fn last_node(state: &StateView) -> Option<(String, u64)> {
+    let (node, sequence) = state.last_node()?;
+    Some((node.as_str().to_owned(), sequence))
 }
 
 /// Whether a state reports something that may end an order without a word: another operating mode than the
 /// automatic ones, an emergency stop (a word that is none of the standard is neither, and a finding of its own), a fatal error, or a failed action.
 #[must_use]
-pub fn may_abandon(state: &Value) -> bool {
+pub fn may_abandon(state: &StateView) -> bool {
     may_abandon_beside(state, &[])
 }
 
 /// Whether it does so beside errors that are known not to hold the vehicle.
-fn may_abandon_beside(state: &Value, borne: &[Value]) -> bool {
-    let failed = elements(state, "actionStates").any(|action| text(action, "actionStatus") == "FAILED");
+fn may_abandon_beside(state: &StateView, borne: &[Print]) -> bool {
+    let failed = state.action_states.iter().any(ActionState::is_failed);
     failed || is_taken_out_beside(state, borne)
 }
 
 /// The errors of a state that ask for a person.
-pub fn fatal_errors(state: &Value) -> impl Iterator<Item = &Value> {
-    elements(state, "errors").filter(|error| !matches!(text(error, "errorLevel"), "WARNING" | "URGENT"))
+pub fn fatal_errors(state: &StateView) -> impl Iterator<Item = &ErrorView> {
+    let is_fatal = |error: &&ErrorView| !matches!(error.error_level.or_empty(), "WARNING" | "URGENT");
+    state.errors.iter().filter(is_fatal)
 }
 
 /// Whether a state reports what [`may_abandon`] asks for but a failed action: whatever is left of the order is still to be
 /// seen then.
 #[must_use]
 pub fn is_taken_out(state: &Value) -> bool {
-    is_taken_out_beside(state, &[])
-}
-
-fn is_taken_out_beside(state: &Value, borne: &[Value]) -> bool {
     let manual = matches!(text(state, "operatingMode"), "MANUAL" | "SERVICE" | "TEACHIN");
     let stopped = state
         .pointer("/safetyState/eStop")
         .is_some_and(|stop| matches!(stop.as_str(), Some("AUTOACK" | "MANUAL" | "REMOTE")));
-    let fatal = fatal_errors(state).any(|error| !borne.contains(error));
+    let fatal = elements(state, "errors").any(|error| !matches!(text(error, "errorLevel"), "WARNING" | "URGENT"));
+    manual || stopped || fatal
+}
+
+fn is_taken_out_beside(state: &StateView, borne: &[Print]) -> bool {
+    let manual = matches!(state.operating_mode.or_empty(), "MANUAL" | "SERVICE" | "TEACHIN");
+    let stopped = matches!(state.emergency_stop(), Some("AUTOACK" | "MANUAL" | "REMOTE"));
+    let fatal = fatal_errors(state).any(|error| !borne.contains(&error.print));
     manual || stopped || fatal
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::{SHARE, found, softly};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::text;
+use tck_view::StateView;
 use tck_world::{Fact, Listen, Observation, Topic, View};
 
 /// `motion/mode-speed`.
@@ -19,7 +19,7 @@ pub(crate) const MODE_SPEED: Check = Check {
     arguments: &["alike"],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
-    needs: &[],
+    needs: &[StateView::operating_mode],
     start: |_| Box::new(ModeSpeed::default()),
 };
 
@@ -121,7 +121,7 @@ impl Running for ModeSpeed {
             return false;
         };
         let now = &step.now;
-        let mode = record.json().map(|state| text(state, "operatingMode").to_owned());
+        let mode = record.state().map(|state| state.operating_mode.or_empty().to_owned());
         let mode = mode.filter(|mode| matches!(mode.as_str(), "AUTOMATIC" | "SEMIAUTOMATIC"));
         let Some(mode) = mode.filter(|_| step.before.is_some() || now.lane.is_some()) else {
             self.present = None;

@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_pack::Pack;
-use tck_world::members::{actions, elements, number, text};
+use tck_view::StateView;
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// How many actions are kept in mind; a state that lists more is judged on the first ones.
@@ -24,7 +24,7 @@ pub(crate) const TRANSITIONS: Check = Check {
     arguments: &[],
     listens: &[Listen::Hook, Listen::Answer, Listen::Delivered(Topic::State)],
     reads: &[],
-    needs: &[],
+    needs: &[StateView::action_states],
     start: |context| {
         Box::new(Transitions {
             graph: Graph::of(context.pack),
@@ -50,7 +50,7 @@ pub(crate) const KEPT: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
-    needs: &[],
+    needs: &[StateView::action_states],
     start: |context| {
         Box::new(Kept {
             graph: Graph::of(context.pack),
@@ -98,11 +98,13 @@ impl Graph {
     }
 
     /// Id and status of every action state; statuses that do not exist are another check's business.
-    fn statuses<'v>(&self, state: &'v Value) -> impl Iterator<Item = (&'v str, &'v str)> {
-        elements(state, "actionStates")
-            .take(ACTIONS)
-            .map(|action| (text(action, "actionId"), text(action, "actionStatus")))
-            .filter(|(id, status)| !id.is_empty() && id.len() <= 512 && self.0.contains_key(*status))
+    fn statuses<'v>(&self, state: &'v StateView) -> impl Iterator<Item = (&'v str, &'v str)> {
+        let listed = state.action_states.iter().take(ACTIONS);
+        let named = listed.filter_map(|action| {
+            let id = action.action_id.there().filter(|id| !id.is_cut() && id.len() <= 512)?;
+            Some((id.as_str(), action.action_status.or_empty()))
+        });
+        named.filter(|(id, status)| !id.is_empty() && self.0.contains_key(*status))
     }
 }
 
@@ -117,7 +119,7 @@ impl Running for Transitions {
         if record.outside_influence() {
             self.last.clear();
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
         let seq = record.seq();
@@ -170,36 +172,40 @@ impl Running for Kept {
         if context.world.restarts().now(record) || record.outside_influence() {
             self.listed.clear();
         }
-        if let Some(message) = record.to_vehicle_json(Topic::InstantActions) {
-            let all = actions(message).map(|action| text(action, "actionId").to_owned());
+        if let Some(message) = record.instant_actions_to_vehicle() {
+            let all = message
+                .all_actions()
+                .map(|action| action.action_id.or_empty().to_owned());
             self.instant.extend(all.take(ACTIONS));
             let excess = self.instant.len().saturating_sub(ACTIONS);
             self.instant.drain(..excess);
-            let cancels = actions(message).filter(|action| text(action, "actionType") == "cancelOrder");
+            let cancels = message
+                .all_actions()
+                .filter(|action| action.action_type.is("cancelOrder"));
             self.cancels
-                .extend(cancels.map(|action| text(action, "actionId").to_owned()));
+                .extend(cancels.map(|action| action.action_id.or_empty().to_owned()));
             let excess = self.cancels.len().saturating_sub(64);
             self.cancels.drain(..excess);
         }
         if let Some(limit) = Self::factsheet_limit(record) {
             self.limit = limit;
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
-        if !state.get("actionStates").is_some_and(Value::is_array) {
+        if !state.action_states.is_there() {
             return false;
         }
         let order = (
-            text(state, "orderId").to_owned(),
-            number(state, "orderUpdateId").unwrap_or_default(),
+            state.order_id.or_empty().to_owned(),
+            state.order_update_id.whole().unwrap_or_default(),
         );
         let now: HashMap<String, String> = self
             .graph
             .statuses(state)
             .map(|(id, status)| (id.to_owned(), status.to_owned()))
             .collect();
-        let complete = elements(state, "actionStates").count() == now.len();
+        let complete = state.action_states.total() == now.len();
         let before = self.order.replace(order.clone());
         let listed = std::mem::take(&mut self.listed);
         let same_order = before
@@ -250,10 +256,8 @@ impl Kept {
     }
 
     fn factsheet_limit(record: &Observation<'_>) -> Option<usize> {
-        let value = record.is_delivered(Topic::Factsheet).then(|| record.json()).flatten()?;
-        let limits = value.pointer("/protocolLimits/maxArrayLens")?;
-        let limit = number(limits, "state.actionStates").unwrap_or_default();
-        usize::try_from(limit).ok()
+        let limits = record.factsheet()?.array_limits()?;
+        usize::try_from(limits.action_states.whole().unwrap_or_default()).ok()
     }
 }
 

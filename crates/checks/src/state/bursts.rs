@@ -8,7 +8,6 @@ use serde_json::Value;
 use crate::finding::{HEADER, broken};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::text;
 use tck_world::{Listen, Observation, Topic};
 
 /// See the module.
@@ -70,7 +69,9 @@ impl Running for Bursts {
             self.equal.clear();
             self.last = Some(now);
         }
-        let stamped: Option<jiff::Timestamp> = text(state, "timestamp").parse().ok();
+        let stamped: Option<jiff::Timestamp> = record
+            .state()
+            .and_then(|state| state.header.timestamp.or_empty().parse().ok());
         self.equal.push_back((record.at().moment, stamped));
         if self.equal.len() < BURST {
             return true;

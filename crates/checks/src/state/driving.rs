@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::finding::{broken, quote, show};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, text};
+use tck_view::{ActionState, Deviation, Member, Number, OrderView, Position, StateView};
 use tck_world::{Fact, Listen, Observation, Topic, last_node};
 
 /// Faster than this in a state without `driving` is no measuring noise, in metres and radians per second.
@@ -50,7 +50,7 @@ pub(crate) const DRIVING: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Displaced],
-    needs: &[],
+    needs: &[StateView::driving, StateView::position],
     start: |_| Box::new(Driving::default()),
 };
 
@@ -71,7 +71,7 @@ pub(crate) const POSITION_MOVES: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Displaced],
-    needs: &[],
+    needs: &[StateView::position, StateView::last_node_id],
     start: |_| Box::new(PositionMoves::default()),
 };
 
@@ -86,17 +86,13 @@ pub(crate) struct Pose {
 
 impl Pose {
     /// The pose of a state or a visualization, where the vehicle knows it.
-    pub(crate) fn of(message: &Value) -> Option<Self> {
-        let position = message.get("agvPosition")?;
-        if position.get("positionInitialized").and_then(Value::as_bool) == Some(false) {
-            return None;
-        }
-        let number = |name| position.get(name).and_then(Value::as_f64);
+    pub(crate) fn of(position: &Member<Position>) -> Option<Self> {
+        let position = position.there().filter(|position| !position.initialized.is(false))?;
         Some(Self {
-            map: text(position, "mapId").chars().take(512).collect(),
-            x: number("x")?,
-            y: number("y")?,
-            theta: number("theta")?,
+            map: position.map_id.or_empty().to_owned(),
+            x: position.x.float()?,
+            y: position.y.float()?,
+            theta: position.theta.float()?,
         })
     }
 
@@ -119,19 +115,18 @@ impl Pose {
 }
 
 /// Whether the vehicle is in command of itself and nothing holds it.
-fn is_free(state: &Value) -> bool {
-    let safety = |name: &str| state.get("safetyState").and_then(|safety| safety.get(name));
-    matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC")
-        && state.get("paused") != Some(&Value::Bool(true))
-        && safety("eStop").is_none_or(|stop| stop.as_str() == Some("NONE"))
-        && safety("fieldViolation") != Some(&Value::Bool(true))
+fn is_free(state: &StateView) -> bool {
+    let stop = state.safety_state.there().map(|safety| &safety.emergency_stop);
+    matches!(state.operating_mode.or_empty(), "AUTOMATIC" | "SEMIAUTOMATIC")
+        && !state.paused.is(true)
+        && stop.is_none_or(|stop| stop.is_absent() || stop.is("NONE"))
+        && state.field_violation() != Some(true)
 }
 
 /// Whether nothing is left for it to drive to, and no action may move it.
-fn has_nowhere_to_go(state: &Value) -> bool {
-    let released = |element: &Value| element.get("released") != Some(&Value::Bool(false));
-    let over = |action: &Value| matches!(text(action, "actionStatus"), "FINISHED" | "FAILED");
-    !elements(state, "nodeStates").any(released) && elements(state, "actionStates").all(over)
+fn has_nowhere_to_go(state: &StateView) -> bool {
+    let nodes = state.node_states.iter();
+    nodes.clone().all(|node| node.released.is(false)) && state.action_states.iter().all(ActionState::is_over)
 }
 
 #[derive(Default)]
@@ -146,10 +141,10 @@ struct Driving {
 }
 
 impl Driving {
-    fn by_position(&mut self, state: &Value, record: &Observation<'_>, findings: &mut Vec<CheckFinding>) {
+    fn by_position(&mut self, state: &StateView, record: &Observation<'_>, findings: &mut Vec<CheckFinding>) {
         let now = record.at().moment;
-        let driving = state.get("driving").and_then(Value::as_bool);
-        let Some(pose) = Pose::of(state).filter(|_| is_free(state) && driving.is_some()) else {
+        let driving = state.driving.flag();
+        let Some(pose) = Pose::of(&state.position).filter(|_| is_free(state) && driving.is_some()) else {
             self.forget();
             return;
         };
@@ -174,7 +169,7 @@ impl Driving {
         }
     }
 
-    fn at_rest(&mut self, pose: Pose, state: &Value, record: &Observation<'_>, findings: &mut Vec<CheckFinding>) {
+    fn at_rest(&mut self, pose: Pose, state: &StateView, record: &Observation<'_>, findings: &mut Vec<CheckFinding>) {
         let now = record.at().moment;
         let nowhere = has_nowhere_to_go(state);
         match &mut self.resting {
@@ -208,7 +203,7 @@ impl Running for Driving {
         if context.world.displaced().now(record) {
             self.forget();
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
         // A vehicle may be slow to take a new place over.
@@ -223,15 +218,23 @@ impl Running for Driving {
             return false;
         }
         self.by_position(state, record, findings);
-        let Some(velocity) = state.get("velocity") else {
-            return Pose::of(state).is_some();
-        };
-        let speed = |name| velocity.get(name).and_then(Value::as_f64).unwrap_or_default().abs();
-        let moving = ["vx", "vy", "omega"].into_iter().any(|name| speed(name) > MOVING);
-        let suspicious = moving && state.get("driving") == Some(&Value::Bool(false));
+        if state.velocity.is_absent() {
+            return Pose::of(&state.position).is_some();
+        }
+        let moving = state.velocity.there().is_some_and(|velocity| {
+            let speeds = [&velocity.vx, &velocity.vy, &velocity.omega];
+            let mut speeds = speeds.into_iter().filter_map(Member::<Number>::float);
+            speeds.any(|speed| speed.abs() > MOVING)
+        });
+        let suspicious = moving && state.driving.is(false);
         match self.suspicious {
             Some(since) if suspicious && now.since(since) >= ONE_CYCLE => {
-                let text = format!("driving is false at velocity {}", show(velocity));
+                let message = record.json();
+                let velocity = message.and_then(|message| record.names().raw(message, &[StateView::velocity]));
+                let text = format!(
+                    "driving is false at velocity {}",
+                    show(velocity.unwrap_or(&Value::Null))
+                );
                 findings.push(broken("STATE-MSG-08", record.seq(), text));
             }
             Some(_) if suspicious => {}
@@ -251,22 +254,21 @@ struct PositionMoves {
 }
 
 impl PositionMoves {
-    fn learn(&mut self, order: &Value) {
-        for node in elements(order, "nodes").take(NODES) {
-            let Some(position) = node.get("nodePosition") else {
+    fn learn(&mut self, order: &OrderView) {
+        for node in order.nodes.iter().take(NODES) {
+            let Some(position) = node.node_position.there() else {
                 continue;
             };
-            let number = |name| position.get(name).and_then(Value::as_f64);
-            let (Some(x), Some(y)) = (number("x"), number("y")) else {
+            let (Some(x), Some(y)) = (position.x.float(), position.y.float()) else {
                 continue;
             };
+            let range = position.allowed_deviation_xy.there().and_then(Deviation::radius);
             // Who is counted as on a node from afar need not come to it.
-            if number("allowedDeviationXY").is_some_and(|range| range > APART) {
-                self.nodes.remove(text(node, "nodeId"));
+            if range.is_some_and(|range| range > APART) {
+                self.nodes.remove(node.node_id.or_empty());
             } else if self.nodes.len() < NODES {
-                let place = (text(position, "mapId").chars().take(512).collect(), x, y);
-                self.nodes
-                    .insert(text(node, "nodeId").chars().take(512).collect(), place);
+                let place = (position.map_id.or_empty().to_owned(), x, y);
+                self.nodes.insert(node.node_id.or_empty().to_owned(), place);
             }
         }
     }
@@ -283,13 +285,13 @@ impl Running for PositionMoves {
             self.before = None;
             self.stuck = 0;
         }
-        if let Some(order) = record.to_vehicle_json(Topic::Order) {
+        if let Some(order) = record.order_to_vehicle() {
             self.learn(order);
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
-        let (Some(pose), Some((node, _))) = (Pose::of(state), last_node(state)) else {
+        let (Some(pose), Some((node, _))) = (Pose::of(&state.position), last_node(state)) else {
             self.before = None;
             return false;
         };
@@ -305,8 +307,7 @@ impl Running for PositionMoves {
             return false;
         }
         // Under way it is not any more where it reached its last node.
-        let rests = state.get("driving").and_then(Value::as_bool) == Some(false)
-            && elements(state, "nodeStates").next().is_none();
+        let rests = state.driving.is(false) && state.node_states.is_empty();
         if let Some((_, was)) = self.before.as_mut().filter(|(last, _)| *last == node) {
             if rests {
                 was.get_or_insert(pose);

@@ -6,13 +6,10 @@
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
-use serde_json::Value;
-
 use crate::finding::{broken, quote};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_view::StateView;
-use tck_world::members::{actions, elements, number, text};
+use tck_view::{Member, Number, OrderView, StateView, Text};
 use tck_world::{Element, Fact, Listen, Observation, Topic, last_node, may_abandon, nodes_left};
 
 /// How many orders on their way are kept in mind.
@@ -40,7 +37,7 @@ pub(crate) const ORDER_KNOWN: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts, Fact::Malformed],
-    needs: &[],
+    needs: &[StateView::order_id, StateView::order_update_id],
     start: |_| Box::new(OrderKnown::looking_for(Part::Known)),
 };
 
@@ -61,7 +58,7 @@ pub(crate) const UPDATE_ID_RISES: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts, Fact::Malformed],
-    needs: &[],
+    needs: &[StateView::order_id, StateView::order_update_id],
     start: |_| Box::new(OrderKnown::looking_for(Part::Rises)),
 };
 
@@ -83,7 +80,7 @@ pub(crate) const NOT_REPLACED: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts, Fact::Malformed],
-    needs: &[],
+    needs: &[StateView::order_id, StateView::order_update_id],
     start: |_| Box::new(OrderKnown::looking_for(Part::Replaced)),
 };
 
@@ -140,7 +137,10 @@ impl OrderKnown {
 
     fn learn(&mut self, record: &Observation<'_>) {
         // One without a name or number is malformed, and looked after there.
-        if let Some(pair) = record.to_vehicle_json(Topic::Order).and_then(named) {
+        if let Some(pair) = record
+            .order_to_vehicle()
+            .and_then(|order| named(&order.order_id, &order.order_update_id))
+        {
             self.since.push(pair.clone());
             self.sent.push_back(pair);
             self.unknown |= self.sent.len() > ORDERS;
@@ -148,8 +148,8 @@ impl OrderKnown {
             self.sent.drain(..excess);
         }
         let cancels = record
-            .to_vehicle_json(Topic::InstantActions)
-            .is_some_and(|message| actions(message).any(|action| text(action, "actionType") == "cancelOrder"));
+            .instant_actions_to_vehicle()
+            .is_some_and(|message| message.all_actions().any(|action| action.action_type.is("cancelOrder")));
         if cancels {
             self.cancelled = self.before.as_ref().map(|before| before.pair.0.clone());
         }
@@ -189,15 +189,18 @@ impl OrderKnown {
     }
 
     /// Learns which orders a vehicle refuses that has still another one to drive.
-    fn refusals(&mut self, record: &Observation<'_>, state: &Value, busy: bool) {
-        let named: BTreeSet<String> = elements(state, "errors")
+    fn refusals(&mut self, record: &Observation<'_>, state: &StateView, busy: bool) {
+        let named: BTreeSet<String> = state
+            .errors
+            .iter()
             .take(REFUSALS)
-            .flat_map(|error| elements(error, "errorReferences").take(REFUSALS))
-            .filter(|reference| text(reference, "referenceKey") == "orderId")
-            .map(|reference| text(reference, "referenceValue").chars().take(512).collect())
+            .flat_map(|error| error.error_references.iter().take(REFUSALS))
+            .filter(|reference| reference.key.is(OrderView::order_id.usual_name()))
+            .map(|reference| reference.value.or_empty().to_owned())
             .collect();
         for order in named.iter().filter(|order| busy && !self.blamed.contains(*order)) {
-            let shown = text(state, "orderId") == order || self.before.as_ref().is_some_and(|it| it.pair.0 == **order);
+            let shown =
+                state.order_id.or_empty() == order || self.before.as_ref().is_some_and(|it| it.pair.0 == **order);
             if shown || self.refused.iter().any(|refused| refused.order == *order) {
                 continue;
             }
@@ -261,9 +264,8 @@ impl OrderKnown {
     }
 }
 
-fn named(message: &Value) -> Option<Pair> {
-    let order = message.get("orderId")?.as_str()?;
-    Some((order.chars().take(512).collect(), number(message, "orderUpdateId")?))
+fn named(order: &Member<Text>, update: &Member<Number>) -> Option<Pair> {
+    Some((order.text()?.to_owned(), update.whole()?))
 }
 
 /// What nodeStates list, if it leads away from the last node: what is listed first may be the node the vehicle is on.
@@ -286,11 +288,12 @@ impl Running for OrderKnown {
             self.before = None;
             self.refused.clear();
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
-        let in_command = matches!(text(state, "operatingMode"), "AUTOMATIC" | "SEMIAUTOMATIC");
-        let pair = named(state).filter(|_| in_command && !context.world.malformed().is_shown_in_command(record));
+        let in_command = matches!(state.operating_mode.or_empty(), "AUTOMATIC" | "SEMIAUTOMATIC");
+        let pair = named(&state.order_id, &state.order_update_id)
+            .filter(|_| in_command && !context.world.malformed().is_shown_in_command(record));
         let Some(pair) = pair else {
             self.before = None;
             self.blamed.clear();
@@ -300,7 +303,7 @@ impl Running for OrderKnown {
         let last = last_node(state);
         let now = Before {
             pair: pair.clone(),
-            ahead: record.state().and_then(|state| ahead(state, last.as_ref())),
+            ahead: ahead(state, last.as_ref()),
             last,
             may_be_over: may_abandon(state),
         };

@@ -5,12 +5,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use serde_json::Value;
-
 use crate::finding::{broken, quote};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{actions, elements, text};
+use tck_view::{ActionView, Json, MapState, StateView};
 use tck_world::{Fact, Listen, Observation, Topic, sets_position};
 
 /// How many maps and map actions are kept in mind.
@@ -35,7 +33,7 @@ pub(crate) const MAP_CHANGES: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
-    needs: &[],
+    needs: &[StateView::maps],
     start: |_| Box::new(MapChanges::default()),
 };
 
@@ -67,30 +65,24 @@ fn short(text: &str) -> String {
     text.chars().take(256).collect()
 }
 
-fn parameter(action: &Value, key: &str) -> String {
-    let found = elements(action, "actionParameters").find(|parameter| text(parameter, "key") == key);
-    short(found.map(|parameter| text(parameter, "value")).unwrap_or_default())
+fn parameter(action: &ActionView, key: &str) -> String {
+    short(action.parameter(key).and_then(Json::text).unwrap_or_default())
 }
 
 fn label(pair: &Pair) -> String {
     format!("map {} version {}", quote(&pair.0), quote(&pair.1))
 }
 
-/// Every action of an order.
-fn of_order(order: &Value) -> impl Iterator<Item = &Value> {
-    let lists = elements(order, "nodes").chain(elements(order, "edges"));
-    lists.flat_map(|element| elements(element, "actions")).take(LIMIT)
-}
-
 impl MapChanges {
     fn learn(&mut self, record: &Observation<'_>) {
-        let instant = record.to_vehicle_json(Topic::InstantActions);
-        let order = record.to_vehicle_json(Topic::Order);
-        let instant = instant.into_iter().flat_map(actions);
-        let all = instant.chain(order.into_iter().flat_map(of_order));
+        let instant = record.instant_actions_to_vehicle().into_iter();
+        let instant = instant.flat_map(|message| message.all_actions());
+        let order = record.order_to_vehicle().into_iter();
+        let order = order.flat_map(|order| order.actions()).map(|(_, action)| action);
+        let all = instant.chain(order);
         for action in all.take(LIMIT) {
             let pair = (parameter(action, "mapId"), parameter(action, "mapVersion"));
-            match text(action, "actionType") {
+            match action.action_type.or_empty() {
                 "downloadMap" => {
                     self.downloading = true;
                     self.downloads.insert(pair.0);
@@ -103,7 +95,7 @@ impl MapChanges {
                 kind if sets_position(kind) => self.open = true,
                 _ => continue,
             }
-            self.ours.insert(short(text(action, "actionId")), record.at().moment);
+            self.ours.insert(short(action.action_id.or_empty()), record.at().moment);
         }
         if self.downloads.len().max(self.enables.len()).max(self.ours.len()) > LIMIT {
             *self = Self {
@@ -166,15 +158,15 @@ impl MapChanges {
     /// Entries that are gone though the route needs their map.
     fn needed(
         &mut self,
-        state: &Value,
+        state: &StateView,
         now: &BTreeMap<Pair, bool>,
         before: &BTreeMap<Pair, bool>,
         found: &mut Vec<(&'static str, String)>,
     ) {
         for (pair, enabled) in before.iter().filter(|(pair, _)| !now.contains_key(*pair)) {
             let others = now.keys().any(|other| other.0 == pair.0);
-            let route = elements(state, "nodeStates").any(|node| {
-                let map = node.pointer("/nodePosition/mapId").and_then(Value::as_str);
+            let route = state.node_states.iter().any(|node| {
+                let map = node.node_position.there().and_then(|position| position.map_id.text());
                 map == Some(pair.0.as_str())
             });
             if *enabled && !others && route && self.told.len() < LIMIT && self.told.insert(pair.clone()) {
@@ -196,30 +188,33 @@ impl Running for MapChanges {
         if context.world.restarts().now(record) || record.outside_influence() {
             self.listed = None;
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
-        let Some(maps) = state.get("maps").and_then(Value::as_array) else {
+        let Some(maps) = state.maps.there() else {
             self.listed = None;
             return false;
         };
-        let read = |map: &Value| {
-            let pair = (short(text(map, "mapId")), short(text(map, "mapVersion")));
-            (pair, text(map, "mapStatus") == "ENABLED")
+        let read = |map: &MapState| {
+            let pair = (short(map.map_id.or_empty()), short(map.map_version.or_empty()));
+            (pair, map.map_status.is("ENABLED"))
         };
         let now: BTreeMap<Pair, bool> = maps.iter().take(LIMIT).map(read).collect();
         let before = self.listed.replace(now.clone());
         // What was asked for may still be about to be done until every map action that was seen has ended.
         let ended = |(id, since): (&String, &Moment)| {
-            let action = elements(state, "actionStates").find(|action| text(action, "actionId") == id);
-            match action.map(|action| text(action, "actionStatus")) {
+            let action = state
+                .action_states
+                .iter()
+                .find(|action| action.action_id.or_empty() == id);
+            match action.map(|action| action.action_status.or_empty()) {
                 Some(status) => matches!(status, "FINISHED" | "FAILED"),
                 // What was refused with its order is never listed.
                 None => record.at().moment.since(*since) > REFUSED,
             }
         };
         let settled = self.ours.iter().all(ended);
-        let judged = before.is_some() && !self.open && maps.len() <= LIMIT;
+        let judged = before.is_some() && !self.open && maps.total() <= LIMIT;
         if let Some(before) = before.filter(|_| judged) {
             let mut found = Vec::new();
             self.compare(&now, &before, settled, &mut found);

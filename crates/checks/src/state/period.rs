@@ -14,7 +14,7 @@ use tck_base::pattern::whole;
 use tck_base::verdict::Verdict;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::{Event, Packet};
-use tck_world::members::text;
+use tck_view::MessageView;
 use tck_world::{End, Listen, Observation, Topic};
 
 /// What the transport may add to an interval of the device.
@@ -160,9 +160,8 @@ impl Running for Period {
                 judged
             }
             "connection" => {
-                let online = record
-                    .json()
-                    .is_some_and(|value| text(value, "connectionState") == "ONLINE");
+                let connection = record.message().and_then(MessageView::connection);
+                let online = connection.is_some_and(|connection| connection.is_online());
                 if !online {
                     self.since = None;
                 } else if self.since.is_none() && !record.link.disturbed {
@@ -171,9 +170,8 @@ impl Running for Period {
                 false
             }
             "factsheet" => {
-                let interval = record
-                    .json()
-                    .and_then(|value| value.pointer("/protocolLimits/timing/defaultStateInterval")?.as_f64());
+                let sheet = record.message().and_then(MessageView::factsheet);
+                let interval = sheet.and_then(|sheet| sheet.timing()?.default_state_interval.float());
                 self.own = interval
                     .filter(|seconds| (0.1..=30.0).contains(seconds))
                     .map(Duration::from_secs_f64);

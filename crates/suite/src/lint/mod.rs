@@ -4,6 +4,7 @@
 //! the test claims. A clause is held against those versions that have one of its requirements; a clause without
 //! requirements has to make sense in at least one.
 
+mod checks;
 mod names;
 mod paths;
 mod pictures;
@@ -21,7 +22,7 @@ use self::paths::Topic;
 use self::scope::Scope;
 use super::CheckInfo;
 use super::fields::Problems;
-use super::model::{About, Assertion, Binding, CheckUse, Monitor, Need, Rule, Selection, Test, Verb};
+use super::model::{About, Assertion, Binding, Monitor, Need, Rule, Selection, Test, Verb};
 use tck_base::diagnostic::{Diagnostic, Span, did_you_mean};
 use tck_base::pattern::Pattern;
 use tck_course::is_station;
@@ -465,64 +466,6 @@ impl Linter<'_> {
             };
         for diagnostic in objection.into_iter().flatten() {
             self.problems.add(diagnostic);
-        }
-    }
-
-    fn check_use(&mut self, check: &CheckUse, requirements: &[&RequirementId], packs: &[usize]) {
-        let known = self.known;
-        let Some(info) = known.iter().find(|info| info.name == check.name) else {
-            let names: Vec<&str> = known.iter().map(|info| info.name).collect();
-            self.problems
-                .unknown("unknown-check", &check.span, "check", &check.name, names);
-            return;
-        };
-        for id in requirements {
-            if !info.decides.contains(&id.as_str()) {
-                self.problems.add(
-                    Diagnostic::new(
-                        "check-decides-other",
-                        check.span.clone(),
-                        format!("the check `{}` does not decide `{id}`", info.name),
-                        "about something else",
-                    )
-                    .hint(format!("it decides {}", info.decides.join(", "))),
-                );
-            }
-        }
-        for (argument, term) in &check.with {
-            if !info.arguments.contains(&argument.as_str()) {
-                let names = info.arguments.iter().copied();
-                self.problems
-                    .unknown("unknown-argument", &term.span, "argument", argument, names);
-            }
-        }
-        self.needs(info, check, requirements, packs);
-    }
-
-    /// A check finds nothing where messages do not have what it looks at, and would pass whatever a device does.
-    fn needs(&mut self, info: &CheckInfo, check: &CheckUse, requirements: &[&RequirementId], packs: &[usize]) {
-        let vocabulary = self.vocabulary;
-        let facts: Vec<_> = requirements
-            .iter()
-            .filter_map(|id| vocabulary.requirement(id.as_str()))
-            .collect();
-        let decides = |pack: usize| facts.is_empty() || facts.iter().any(|facts| facts.packs.contains(&pack));
-        let versions = vocabulary.versions();
-        for pack in packs.iter().copied().filter(|pack| decides(*pack)) {
-            let member = info.needs.iter().find(|member| vocabulary.lacks(pack, **member));
-            let (Some(member), Some(version)) = (member, versions.get(pack)) else {
-                continue;
-            };
-            self.problems.add(
-                Diagnostic::new(
-                    "check-without-member",
-                    check.span.clone(),
-                    format!("the check `{}` has nothing to look at in {version}", info.name),
-                    format!("it needs `{member}`, which messages of {version} do not have"),
-                )
-                .hint("let `spec` leave that version out"),
-            );
-            return;
         }
     }
 
