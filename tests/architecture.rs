@@ -480,6 +480,50 @@ fn versions_are_data() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// The text literals that a line looks for in another text.
+fn looked_for(line: &str) -> impl Iterator<Item = &str> {
+    const CALLS: [&str; 7] = [
+        "starts_with(\"",
+        "ends_with(\"",
+        "contains(\"",
+        "strip_prefix(\"",
+        "strip_suffix(\"",
+        "split_once(\"",
+        "split(\"",
+    ];
+    let behind = CALLS.iter().flat_map(|call| line.split(call).skip(1));
+    behind.filter_map(|rest| rest.split('"').next())
+}
+
+/// The rooms that make, carry and show results. Elsewhere the sentences of libraries are read that give no type.
+const ROOMS_OF_RESULTS: [&str; 9] = [
+    "run", "judge", "result", "report", "audit", "watch", "explore", "cli", "ui",
+];
+
+#[test]
+fn sentences_are_displayed_and_never_taken_apart() {
+    let is_sentence = |text: &str| {
+        let words: Vec<&str> = text.split(' ').filter(|word| word.len() > 1).collect();
+        words.len() > 1 && words.iter().all(|word| word.chars().all(|c| c.is_ascii_alphabetic()))
+    };
+    assert!(looked_for("if why.starts_with(\"there is no factsheet \") {").any(is_sentence));
+    assert!(looked_for("None if why.starts_with(\"not applicable\") => x").any(is_sentence));
+    assert!(!looked_for("name.strip_prefix(\"time.\") || line.contains(\" = \")").any(is_sentence));
+    let is_meant = |path: &Path| ROOMS_OF_RESULTS.contains(&in_room(path).split('/').next().unwrap_or_default());
+    let mut wrong = Vec::new();
+    for (path, text) in sources()
+        .into_iter()
+        .filter(|(path, _)| is_meant(path) && !is_test_file(path))
+    {
+        for (line, content) in code(&text) {
+            for found in looked_for(content).filter(|found| is_sentence(found)) {
+                wrong.push(format!("{}:{line}: looks for {found:?} in a sentence", in_room(&path)));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "match on a type instead:\n{}", wrong.join("\n"));
+}
+
 #[test]
 fn incoming_messages_stay_values() {
     // Typed structs would repair what has to be detected: only the journal's own records, the results, the

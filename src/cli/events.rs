@@ -124,8 +124,8 @@ impl run::Progress for Followed {
         self.screen.planned(plan);
         let tests = plan.tests.iter().map(|test| match &test.gate {
             Gate::Runs => json!({ "test": test.test, "gate": "runs" }),
-            Gate::NotApplicable(why) => json!({ "test": test.test, "gate": "not-applicable", "why": why }),
-            Gate::Unobservable(why) => json!({ "test": test.test, "gate": "inconclusive", "why": why }),
+            Gate::NotApplicable(why) => json!({ "test": test.test, "gate": "not-applicable", "why": why.to_string() }),
+            Gate::Unobservable(why) => json!({ "test": test.test, "gate": "inconclusive", "why": why.to_string() }),
         });
         let tests: Vec<Value> = tests.collect();
         self.tell("planned", json!({ "tests": tests }));

@@ -247,11 +247,13 @@ fn whereabouts(flaw: &Flaw, topic: &str, text: &[u8], value: Option<&Value>) -> 
     let Some(value) = value else {
         return (None, broken_at(text));
     };
-    if flaw.text.contains("occurs twice")
-        && let Some((pointer, name)) = place::repeated(text)
-            .into_iter()
-            .find(|(pointer, _)| pointer.rsplit('/').next().is_some_and(|name| flaw.text.contains(name)))
-    {
+    let is_meant = |pointer: &str| {
+        let name = pointer.rsplit('/').next().unwrap_or_default();
+        flaw.text
+            .contains(&JsonProblem::DuplicateMember(name.to_owned()).to_string())
+    };
+    let mut repeated = place::repeated(text).into_iter();
+    if let Some((pointer, name)) = repeated.find(|(pointer, _)| is_meant(pointer)) {
         return (Some(pointer), name.start);
     }
     let pointer = place::named(&flaw.text, topic, value).into_iter().next();

@@ -136,7 +136,7 @@ fn text(plan: &RunPlan) -> String {
     );
     let motion = match (&plan.stands_still, plan.moving(), plan.role) {
         (_, _, "master-control") => "only the mock vehicles of this tool".to_owned(),
-        (Some(why), ..) => format!("none: {}", escaped(why)),
+        (Some(why), ..) => format!("none: {}", escaped(&why.to_string())),
         (None, 0, _) => "none: no test drives".to_owned(),
         (None, tests, _) => format!(
             "the vehicle drives in {}, about {} m in all",
@@ -182,7 +182,7 @@ fn text(plan: &RunPlan) -> String {
             let what = if gate == Waits::Inconclusive {
                 advice(why)
             } else {
-                why.to_owned()
+                why.to_string()
             };
             let _ = writeln!(text, "{:>11}  {}", many(tests.len(), "test"), escaped(&what));
             let named: Vec<&str> = tests.iter().take(NAMED).copied().collect();

@@ -26,8 +26,8 @@ use crate::ui::Desk;
 use tck_base::clock::WallClock;
 use tck_base::diagnostic::{Diagnostic, Source, Span};
 use tck_base::secrets::Secrets;
-use tck_journal::Vantage;
 use tck_journal::file::JournalWriter;
+use tck_journal::{Reason, Vantage};
 use tck_judge::Library;
 use tck_judge::RunJudge;
 use tck_net::bench::LinkError;
@@ -239,7 +239,7 @@ impl Job {
             self.of_profile(arguments, surroundings)?
         };
         if self.no_motion {
-            run.device.stand_still(NO_MOTION);
+            run.device.stand_still(Reason::MotionRuledOut);
         }
         super::plan::show(&self.planned(run), self.output.format)
     }
@@ -298,7 +298,7 @@ impl Job {
         run.settings = settings;
         run.earlier = self.earlier.as_ref().map(|earlier| earlier.journal.clone());
         if self.no_motion {
-            run.motion = Err(NO_MOTION.to_owned());
+            run.motion = Err(Reason::MotionRuledOut);
         }
         let mut saved = saving(&bundle);
         let finished = run_virtually(
@@ -370,7 +370,7 @@ impl Job {
         outputs: &Outputs<'_>,
     ) -> Result<Exit, Problem> {
         if self.no_motion {
-            run.device.stand_still(NO_MOTION);
+            run.device.stand_still(Reason::MotionRuledOut);
         }
         run.request = self.request.clone();
         if let Some(earlier) = &self.earlier {
@@ -523,5 +523,3 @@ fn saving(bundle: &Bundle) -> impl FnMut(&RunJudge) + '_ {
         }
     }
 }
-
-const NO_MOTION: &str = "motion was ruled out by --no-motion";

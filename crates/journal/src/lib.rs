@@ -16,6 +16,7 @@ pub mod place;
 mod plan;
 mod program;
 mod read;
+mod reason;
 mod serving;
 mod vantage;
 mod waiver;
@@ -30,6 +31,7 @@ pub use event::{Direction, Event, Packet, Payload, Record, Source, Will};
 pub use json::Parsed;
 pub use plan::tool;
 use read::Read;
+pub use reason::{OwnError, Reason};
 pub use serving::ServeBehaviour;
 pub use vantage::Vantage;
 

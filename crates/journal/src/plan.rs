@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use super::Reason;
+
 /// One effective setting and where it came from.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Setting {
@@ -113,9 +115,9 @@ pub enum Gate {
     /// It runs.
     Runs,
     /// The device declares that it lacks what the test needs.
-    NotApplicable(String),
+    NotApplicable(#[serde(deserialize_with = "Reason::or_sentence")] Reason),
     /// The bench, the profile or the device leaves open what the test needs.
-    Unobservable(String),
+    Unobservable(#[serde(deserialize_with = "Reason::or_sentence")] Reason),
 }
 
 /// A capability and its source.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::watches::Watched;
 use tck_base::verdict::Verdict;
+use tck_journal::Reason;
 use tck_result::{Repetition, TestResult};
 
 /// One result for each test. Of several repetitions the worst stands for the test; what any of them decided beside counts,
@@ -47,7 +48,8 @@ fn both(one: &mut TestResult, other: &TestResult) {
 }
 
 /// Adds the repetitions of a test that were asked for and not done: each is inconclusive, and with it the test.
-pub(super) fn left_out(test: &mut TestResult, asked: u32, why: &str) {
+pub(super) fn left_out(test: &mut TestResult, asked: u32, cause: Option<&Reason>) {
+    let why = cause.map_or_else(|| "the run ended before".to_owned(), ToString::to_string);
     let done = test.repetitions.len();
     let missing: Vec<u32> = (1..=asked)
         .filter(|number| test.repetitions.iter().all(|one| one.number != *number))
@@ -59,7 +61,7 @@ pub(super) fn left_out(test: &mut TestResult, asked: u32, why: &str) {
         number,
         verdict: Some(Verdict::Inconclusive),
         seconds: 0.0,
-        reason: Some(why.to_owned()),
+        reason: Some(why.clone()),
         journal: None,
     }));
     test.repetitions.sort_by_key(|one| one.number);
@@ -69,6 +71,7 @@ pub(super) fn left_out(test: &mut TestResult, asked: u32, why: &str) {
     if test.verdict != Some(verdict) {
         test.verdict = Some(verdict);
         test.reason = Some(format!("run {done} of {asked} times: {why}"));
+        test.cause = cause.cloned();
     }
 }
 
@@ -125,6 +128,7 @@ mod tests {
             not_applicable: None,
             seconds: 1.0,
             reason: None,
+            cause: None,
             maturity: "reviewed".to_owned(),
             maturity_note: None,
             journal: Some((u64::from(number), u64::from(number))),
@@ -172,9 +176,12 @@ mod tests {
     #[test]
     fn a_repetition_that_was_not_done_leaves_the_test_undecided_and_takes_no_failure_back() {
         let mut passed = run(1, Verdict::Pass, &[("A", Verdict::Pass)]);
-        left_out(&mut passed, 3, "nobody was there");
+        left_out(&mut passed, 3, Some(&Reason::NoTap));
         assert_eq!(passed.verdict, Some(Verdict::Inconclusive));
-        assert_eq!(passed.reason.as_deref(), Some("run 1 of 3 times: nobody was there"));
+        assert_eq!(
+            passed.reason.as_deref(),
+            Some("run 1 of 3 times: it needs the device to connect through the tap")
+        );
         let done: Vec<bool> = passed.repetitions.iter().map(Repetition::was_done).collect();
         assert_eq!(
             (done, passed.left_out(), passed.is_flaky()),
@@ -182,9 +189,9 @@ mod tests {
         );
         assert!(!is_decided(&passed), "a run that goes on with this one does them");
         let mut failed = run(2, Verdict::Fail, &[("A", Verdict::Fail)]);
-        left_out(&mut failed, 2, "why");
+        left_out(&mut failed, 2, None);
         assert_eq!((failed.verdict, failed.repetitions[0].number), (Some(Verdict::Fail), 1));
-        left_out(&mut failed, 2, "why");
+        left_out(&mut failed, 2, None);
         assert_eq!(failed.left_out(), 1);
     }
 

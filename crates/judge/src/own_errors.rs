@@ -3,20 +3,20 @@
 use serde_json::Value;
 
 use super::timeline::Timeline;
+use tck_journal::OwnError;
 
 /// How many states are looked through for a new error.
 const STATES: usize = 200;
 
-/// The errors a vehicle reports since a message was sent to it, first those it did not report before; `None` if there are
-/// no errors at all.
-pub(super) fn reported(timeline: &Timeline, since: u64) -> Option<String> {
+/// The errors a vehicle reports since a message was sent to it, those it did not report before if there are any.
+pub(super) fn reported(timeline: &Timeline, since: u64) -> Vec<OwnError> {
     let new = added(timeline, since);
     if !new.is_empty() {
-        return Some(in_words(&new));
+        return named(&new);
     }
-    let state = timeline.of("state").last()?.json()?;
-    let all: Vec<Value> = errors(state).to_vec();
-    (!all.is_empty()).then(|| in_words(&all))
+    let states = timeline.of("state");
+    let state = states.last().and_then(|entry| entry.json());
+    state.map_or_else(Vec::new, |state| named(errors(state)))
 }
 
 /// Whether the vehicle says by a new error that it did not take what was sent to it. Errors about anything else do not
@@ -55,32 +55,22 @@ fn errors(state: &Value) -> &[Value] {
         .map_or(&[][..], Vec::as_slice)
 }
 
-fn in_words(errors: &[Value]) -> String {
+/// The first errors by level and type, with what they refer to.
+fn named(errors: &[Value]) -> Vec<OwnError> {
     let text = |value: &Value, name: &str| -> String {
         let found = value.get(name).and_then(Value::as_str).unwrap_or_default();
         found.chars().take(60).collect()
     };
     let one = |error: &Value| {
         let references = error.get("errorReferences").and_then(Value::as_array);
-        let named: Vec<String> = references
-            .into_iter()
-            .flatten()
-            .take(3)
-            .map(|reference| {
-                format!(
-                    "{} {}",
-                    text(reference, "referenceKey"),
-                    text(reference, "referenceValue")
-                )
-            })
-            .collect();
-        let named = if named.is_empty() {
-            String::new()
-        } else {
-            format!(" ({})", named.join(", "))
-        };
-        format!("{} {}{named}", text(error, "errorLevel"), text(error, "errorType"))
+        let references = references.into_iter().flatten().take(3).map(|reference| {
+            let (key, value) = (text(reference, "referenceKey"), text(reference, "referenceValue"));
+            format!("{key} {value}")
+        });
+        OwnError {
+            error: format!("{} {}", text(error, "errorLevel"), text(error, "errorType")),
+            references: references.collect(),
+        }
     };
-    let all: Vec<String> = errors.iter().take(2).map(one).collect();
-    format!("the vehicle itself reports {}", all.join(" and "))
+    errors.iter().take(2).map(one).collect()
 }

@@ -146,6 +146,7 @@ mod tests {
             not_applicable: None,
             seconds: 0.0,
             reason: None,
+            cause: None,
             maturity: String::new(),
             maturity_note: None,
             journal: Some((1, 2)),

@@ -21,8 +21,8 @@ use tck_base::pattern::Bindings;
 use tck_base::time::TimeLimits;
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_check::Check;
-use tck_journal::Entry;
 use tck_journal::event::{Event, StepEnd, Waiver};
+use tck_journal::{Entry, Reason};
 use tck_pack::{Catalogue, Pack, Role};
 use tck_result::{Decision, StepResult, TestResult, Waited};
 use tck_suite::model::{Section, Step, Test, Verb};
@@ -96,7 +96,7 @@ pub struct TestJudge {
     cursor: u64,
     base: Moment,
     running: Option<Running>,
-    preamble: Result<(), String>,
+    preamble: Result<(), Reason>,
     body: Result<(), String>,
     trouble: Option<String>,
     verdict: Accumulated,
@@ -149,6 +149,7 @@ impl TestJudge {
                 not_applicable: None,
                 seconds: 0.0,
                 reason: None,
+                cause: None,
                 maturity: test.maturity.word().to_owned(),
                 maturity_note: test.maturity.note().map(str::to_owned),
                 journal: Some((seq, seq)),
@@ -327,19 +328,18 @@ impl TestJudge {
             self.base = at;
         }
         if let Some(Err(why)) = &outcome.reached {
-            let place = format!(
-                "{} ({})",
-                step.title.clone().unwrap_or_else(|| step.path.clone()),
-                step.span.place()
-            );
-            let own = reported(timeline, self.mark)
-                .map(|own| format!("; {own}"))
-                .unwrap_or_default();
+            let (name, place) = (step.title.as_ref().unwrap_or(&step.path), step.span.place());
             match section {
                 Section::Given => {
-                    self.preamble = Err(format!("the precondition was not reached: {place}: {why}{own}"));
+                    self.preamble = Err(Reason::PreconditionMissed {
+                        step: name.clone(),
+                        place,
+                        shared: step.span.source.name != self.test.source.name,
+                        seen: why.clone(),
+                        errors: reported(timeline, self.mark),
+                    });
                 }
-                Section::Steps => self.body = Err(format!("{place}: {why}")),
+                Section::Steps => self.body = Err(format!("{name} ({place}): {why}")),
                 Section::Finally => {}
             }
         }
@@ -386,7 +386,12 @@ impl TestJudge {
     /// A device that does not do what it is asked for, or an operator who skips the test, leaves the test undecided; it is nobody's breakdown.
     fn refused(&mut self, section: Section, step: &Step, why: &str) {
         match section {
-            Section::Given => self.preamble = Err(format!("the precondition was not reached: {}: {why}", step.path)),
+            Section::Given => {
+                self.preamble = Err(Reason::PreconditionRefused {
+                    step: step.path.clone(),
+                    seen: why.to_owned(),
+                });
+            }
             Section::Steps => self.body = Err(format!("{}: {why}", step.path)),
             Section::Finally => {}
         }
@@ -487,15 +492,16 @@ impl TestJudge {
             self.push(decision);
         }
         let why = match (&self.trouble, &self.preamble, &self.body) {
-            (Some(trouble), _, _) => trouble.clone(),
-            (None, Ok(()), _) if hidden.is_some() => hidden.unwrap_or_default(),
+            (Some(trouble), _, _) => Reason::observed(trouble),
+            (None, Ok(()), _) if hidden.is_some() => Reason::observed(hidden.unwrap_or_default()),
             (None, Err(why), _) => why.clone(),
             (None, Ok(()), Err(why)) => {
                 let other = self.interference.as_ref().map(|other| format!("{other}; "));
-                format!("{}an earlier step failed: {why}", other.unwrap_or_default())
+                Reason::observed(format!("{}an earlier step failed: {why}", other.unwrap_or_default()))
             }
-            (None, Ok(()), Ok(())) => "the test ended before this was judged".to_owned(),
+            (None, Ok(()), Ok(())) => Reason::observed("the test ended before this was judged"),
         };
+        let sentence = why.to_string();
         let run: Vec<String> = self.result.steps.iter().map(|step| step.path.clone()).collect();
         let test = Arc::clone(&self.test);
         for step in test.steps.iter().filter(|step| !run.contains(&step.path)) {
@@ -521,7 +527,13 @@ impl TestJudge {
                     continue;
                 }
                 let place = step.verb_span.place();
-                let decision = Decision::new(requirement.as_str(), Verdict::Inconclusive, clause, place, why.clone());
+                let decision = Decision::new(
+                    requirement.as_str(),
+                    Verdict::Inconclusive,
+                    clause,
+                    place,
+                    sentence.clone(),
+                );
                 self.push(Some(decision));
             }
         }
@@ -529,13 +541,16 @@ impl TestJudge {
             self.verdict.add(Verdict::Error);
         }
         self.result.verdict = self.verdict.get();
-        self.result.reason = match (self.reason(&why), self.departure.story()) {
+        let (reason, cause) = self.reason(why).unzip();
+        self.result.cause = cause.flatten();
+        self.result.reason = match (reason, self.departure.story()) {
             (Some(reason), Some(story)) => Some(format!("{reason}; {story}")),
             (reason, story) => reason.or(story),
         };
     }
 
-    fn reason(&self, why: &str) -> Option<String> {
+    /// Why the verdict is not a pass, and of which kind that is where more than the text tells.
+    fn reason(&self, why: Reason) -> Option<(String, Option<Reason>)> {
         let verdict = self.verdict.get()?;
         if verdict == Verdict::Pass {
             return None;
@@ -547,9 +562,9 @@ impl TestJudge {
             .find(|decision| decision.verdict() == verdict);
         Some(match decisive {
             Some(decision) if verdict != Verdict::Inconclusive => {
-                format!("{}: {}", decision.requirement, decision.message)
+                (format!("{}: {}", decision.requirement, decision.message), None)
             }
-            _ => why.to_owned(),
+            _ => (why.to_string(), why.typed()),
         })
     }
 

@@ -1,53 +1,57 @@
 //! What can be done so that more is decided: for a cause, what to write into the profile or to do at the bench.
 
+use tck_journal::Reason;
+
 /// What to do about a reason why tests decided nothing; the reason itself when only looking at the device helps.
 #[must_use]
-pub fn advice(reason: &str) -> String {
-    if let Some(hook) = between(reason, "the profile has no hook `", "`") {
-        return format!("[hooks.{hook}]: tell how it is done (`vda5050-tck explain {hook}`)");
-    }
-    if let Some(name) = between(reason, "the profile does not name `", "`") {
-        let what = reason.split_once("`: ").map_or("", |(_, what)| what);
-        return format!("{name} = …: name it in the profile{}", said(what));
-    }
-    if let Some(name) = between(reason, "the profile does not say whether the device is `", "`") {
-        return format!("device.{name} = true or false: say it in the profile");
-    }
-    if reason.contains("[motion] allowed = true") {
-        return "[motion] allowed = true: let the vehicle drive, where the floor is free".to_owned();
-    }
-    if reason.contains("--no-motion") {
-        return "leave out --no-motion, where the floor is free".to_owned();
-    }
-    if reason.contains("[maps] files") {
-        return "[maps] files = […]: name a map file that the device can read".to_owned();
-    }
-    if reason.contains("maps-host") {
-        return "[bench] maps-listen and maps-host: let the device reach the map server".to_owned();
-    }
-    if reason.contains("through the tap") {
-        return "connect the device to the address of [bench] listen, and leave `tap = false` out".to_owned();
-    }
-    if let Some(name) = reason
-        .strip_prefix("there is no factsheet that could say whether it has: ")
-        .or_else(|| reason.strip_prefix("the factsheet has no list that could say whether it has: "))
-    {
-        return format!("[device] claims: say whether the device has `{name}`, or let its factsheet say it");
-    }
-    reason.to_owned()
+pub fn advice(reason: &Reason) -> String {
+    remedy(reason).unwrap_or_else(|| reason.to_string())
 }
 
-fn said(what: &str) -> String {
-    match what {
-        "" => String::new(),
-        what => format!(" ({what})"),
-    }
-}
-
-fn between<'a>(text: &'a str, before: &str, after: &str) -> Option<&'a str> {
-    let (_, rest) = text.split_once(before)?;
-    let (found, _) = rest.split_once(after)?;
-    Some(found)
+/// What to write into the profile or to do at the bench; `None` when only looking at the device helps.
+pub(super) fn remedy(reason: &Reason) -> Option<String> {
+    Some(match reason {
+        Reason::NoHook { hook } => {
+            format!("[hooks.{hook}]: tell how it is done (`vda5050-tck explain {hook}`)")
+        }
+        Reason::NoSample { sample, what } => format!("device.{sample} = …: name it in the profile ({what})"),
+        Reason::NotStated { statement } => format!("device.{statement} = true or false: say it in the profile"),
+        Reason::MotionNotAllowed => {
+            "[motion] allowed = true: let the vehicle drive, where the floor is free".to_owned()
+        }
+        Reason::MotionRuledOut => "leave out --no-motion, where the floor is free".to_owned(),
+        Reason::NoMapFile => "[maps] files = […]: name a map file that the device can read".to_owned(),
+        Reason::MapServerUnreachable { .. } | Reason::MapServerElsewhere { .. } => {
+            "[bench] maps-listen and maps-host: let the device reach the map server".to_owned()
+        }
+        Reason::NoTap => "connect the device to the address of [bench] listen, and leave `tap = false` out".to_owned(),
+        Reason::NoFactsheet { capability } | Reason::NoList { capability } => {
+            format!("[device] claims: say whether the device has `{capability}`, or let its factsheet say it")
+        }
+        Reason::NobodyToAsk { .. }
+        | Reason::NothingForHook { .. }
+        | Reason::SampleDenied { .. }
+        | Reason::StatedFalse { .. }
+        | Reason::NoActiveMap
+        | Reason::NoLayout
+        | Reason::NotListed { .. }
+        | Reason::BlockingTypeNotListed { .. }
+        | Reason::Denied { .. }
+        | Reason::ListedAndDenied { .. }
+        | Reason::ClaimedAndNotListed { .. }
+        | Reason::NoFactsheetOfNeeds { .. }
+        | Reason::Required { .. }
+        | Reason::Present { .. }
+        | Reason::ArrayLimit { .. }
+        | Reason::IdLimit { .. }
+        | Reason::NumericalIds
+        | Reason::AfterFailure { .. }
+        | Reason::SetAside { .. }
+        | Reason::PreconditionMissed { .. }
+        | Reason::PreconditionRefused { .. }
+        | Reason::RunEnded
+        | Reason::Observed { .. } => return None,
+    })
 }
 
 #[cfg(test)]
@@ -56,17 +60,24 @@ mod tests {
 
     #[test]
     fn a_cause_says_what_to_write_and_anything_else_is_quoted() {
-        let hook = "the profile has no hook `set-mode` ([hooks.set-mode])";
-        assert!(advice(hook).starts_with("[hooks.set-mode]: "));
-        let sample = "the profile does not name `device.long-action`: it takes some seconds";
+        let hook = Reason::NoHook {
+            hook: "set-mode".to_owned(),
+        };
+        assert!(advice(&hook).starts_with("[hooks.set-mode]: "));
+        let sample = Reason::NoSample {
+            sample: "long-action".to_owned(),
+            what: "it takes some seconds".to_owned(),
+        };
         assert_eq!(
-            advice(sample),
+            advice(&sample),
             "device.long-action = …: name it in the profile (it takes some seconds)"
         );
-        let statement = "the profile does not say whether the device is `node-bound`";
-        assert!(advice(statement).starts_with("device.node-bound = true or false"));
-        let motion = "the profile does not allow motion ([motion] allowed = true)";
-        assert!(advice(motion).starts_with("[motion] allowed = true: "));
-        assert_eq!(advice("the vehicle stood in the way"), "the vehicle stood in the way");
+        let statement = Reason::NotStated {
+            statement: "node-bound".to_owned(),
+        };
+        assert!(advice(&statement).starts_with("device.node-bound = true or false"));
+        assert!(advice(&Reason::MotionNotAllowed).starts_with("[motion] allowed = true: "));
+        let seen = "the vehicle stood in the way, and [motion] allowed = true";
+        assert_eq!(advice(&Reason::observed(seen)), seen);
     }
 }

@@ -499,7 +499,8 @@ fn requirement_case(
         Some(Gap::NotDecided) => Some(Verdict::Inconclusive),
         _ => requirement.verdict,
     };
-    let message = match (finding, &requirement.not_decided) {
+    let gap = requirement.not_decided.as_ref().map(ToString::to_string);
+    let message = match (finding, &gap) {
         (Some(finding), _) => finding.seen.as_str(),
         (None, Some(why)) => why.as_str(),
         (None, None) => "no test came to a decision",

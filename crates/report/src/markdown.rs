@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 
-use super::advice::advice;
 use super::clean::{line, short};
 use super::findings::{Finding, findings};
 use super::sources::{HowDecided, Sources};
@@ -35,12 +34,7 @@ pub fn summary(result: &RunResult, sources: &Sources, report: Option<&str>) -> S
     if !groups.is_empty() {
         text += "\n### To decide more\n\n| Tests | What to do |\n|---:|---|\n";
         for group in groups.iter().take(ROWS) {
-            let _ = writeln!(
-                text,
-                "| {} | {} |",
-                escaped(&group.count()),
-                escaped(&advice(group.reason))
-            );
+            let _ = writeln!(text, "| {} | {} |", escaped(&group.count()), escaped(&group.advice()));
         }
         more(groups.len(), &mut text);
     }

@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 
-use super::advice::advice;
 use super::clean::{line, short};
 use super::findings::{Finding, findings};
 use super::headline::reference;
@@ -131,7 +130,7 @@ fn to_decide_more(result: &RunResult, color: Color, text: &mut String) {
     for group in groups {
         let count = format!("{:>11}", group.count());
         let count = color.verdict(Some(Verdict::Inconclusive)).apply_to(count);
-        let _ = writeln!(text, "{count}  {}", short(&line(&advice(group.reason)), 240));
+        let _ = writeln!(text, "{count}  {}", short(&line(&group.advice()), 240));
         let _ = writeln!(text, "             {}", color.dim().apply_to(group.named()));
     }
 }

@@ -5,7 +5,7 @@
 
 use super::clean::line;
 use tck_base::verdict::Verdict;
-use tck_result::{ProgramResult, RequirementResult, RunResult, TestResult};
+use tck_result::{NotDecided, ProgramResult, RequirementResult, RunResult, TestResult};
 
 /// How many of something got which verdict.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -109,12 +109,11 @@ pub enum Gap {
 /// Why a requirement has no verdict; `None` when it has one.
 #[must_use]
 pub fn gap(requirement: &RequirementResult) -> Option<Gap> {
-    let why = requirement.not_decided.as_deref().unwrap_or_default();
-    match requirement.verdict {
-        Some(_) => None,
-        None if why.starts_with("not applicable") => Some(Gap::NotApplicable),
-        None if why.starts_with("not testable") => Some(Gap::NotTestable),
-        None => Some(Gap::NotDecided),
+    match (requirement.verdict, &requirement.not_decided) {
+        (Some(_), _) => None,
+        (None, Some(NotDecided::NotApplicable(_))) => Some(Gap::NotApplicable),
+        (None, Some(NotDecided::NotTestable(_))) => Some(Gap::NotTestable),
+        (None, _) => Some(Gap::NotDecided),
     }
 }
 

@@ -3,6 +3,7 @@
 #![warn(missing_docs)]
 
 mod exploration;
+mod not_decided;
 mod program;
 
 use std::collections::BTreeMap;
@@ -10,8 +11,10 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 pub use self::exploration::{Answers, ExplorationResult, MemberResult, SaidResult};
+pub use self::not_decided::NotDecided;
 pub use self::program::{ProgramEnd, ProgramResult};
 use tck_base::verdict::{Accumulated, Verdict};
+use tck_journal::Reason;
 use tck_journal::event::Setting;
 
 /// `result.json`.
@@ -243,6 +246,9 @@ pub struct TestResult {
     /// Why the verdict is not a pass, in one line.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
+    /// Of which kind that is, or why it does not apply; absent where only the text tells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cause: Option<Reason>,
     /// `reviewed`, `not reviewed` or `watchlist`.
     pub maturity: String,
     /// When it was reviewed and what was looked at, or what is disputed.
@@ -503,9 +509,9 @@ pub struct RequirementResult {
     /// Where they disagree: every verdict with those that gave it, the worst first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub verdicts: Vec<Given>,
-    /// Why nothing did: `not applicable`, `no test`, `not testable: …`, `not selected`.
+    /// Why nothing did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub not_decided: Option<String>,
+    pub not_decided: Option<NotDecided>,
 }
 
 /// A capability and its source.

@@ -8,6 +8,7 @@ use super::pace::{Pace, between_looks};
 use super::rest::Home;
 use tck_course::{Layout, Standing};
 use tck_engine::IdForm;
+use tck_journal::Reason;
 use tck_journal::event::{Event, Packet};
 use tck_judge::RunJudge;
 use tck_pack::Role;
@@ -47,24 +48,27 @@ pub(super) fn course_of(
     layout: Option<&Layout>,
     judge: &RunJudge,
     home: &Home,
-) -> Result<Option<Value>, String> {
+) -> Result<Option<Value>, Reason> {
     if test.course.nodes.is_empty() {
         return Ok(None);
     }
-    let layout = layout.ok_or("the profile has no layout, and this test needs nodes")?;
-    let standing = standing(judge, layout, home).ok_or("the vehicle does not say where it stands")?;
+    let layout = layout.ok_or(Reason::NoLayout)?;
+    let standing =
+        standing(judge, layout, home).ok_or_else(|| Reason::observed("the vehicle does not say where it stands"))?;
     let course = if test.device == Role::MasterControl {
         layout.outward(&test.course, &standing)
     } else if test.course.directed {
         let layout = layout.clone().directed();
         if layout.edges().next().is_none() {
-            return Err("no edge of the layout says its direction at a junction".to_owned());
+            return Err(Reason::observed(
+                "no edge of the layout says its direction at a junction",
+            ));
         }
         layout.assign(&test.course, &standing)
     } else {
         layout.assign(&test.course, &standing)
     };
-    let course = course.map_err(|error| error.to_string())?;
+    let course = course.map_err(|error| Reason::observed(error.to_string()))?;
     let mut course = course.bindings();
     let factsheet = judge
         .ground()

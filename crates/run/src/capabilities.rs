@@ -10,23 +10,13 @@ use serde_json::{Map, Value};
 
 use super::fits::outgrown;
 use tck_base::pattern::{Term, TermKind};
-use tck_journal::Vantage;
 use tck_journal::event::{Capability, Gate};
+use tck_journal::{Reason, Vantage};
 use tck_profile::{SAMPLE_ACTIONS, SampleKind};
 use tck_suite::model::{Need, SendAction, ServeBehaviour, Test, Verb};
 
 /// Found out from the first state, and said by no profile.
 const ACTIVE_MAP: &str = "active-map";
-
-/// How a reason begins that the factsheet of the device takes away.
-const NO_FACTSHEET: &str = "there is no factsheet ";
-/// The reason that the first state of the device takes away.
-const NO_ACTIVE_MAP: &str = "the first state shows no enabled map on which the vehicle stands";
-
-/// Whether only the device itself can say if this stands in the way.
-pub(super) fn is_said_by_the_device(why: &str) -> bool {
-    why.starts_with(NO_FACTSHEET) || why == NO_ACTIVE_MAP
-}
 
 /// What is known about device, bench and profile.
 #[derive(Clone, Debug)]
@@ -46,11 +36,11 @@ pub struct Capabilities {
     /// Names of the hooks that are prompts, where nobody can be asked.
     pub unattended: Vec<String>,
     /// Whether the device can reach the map server; `Err` says why not.
-    pub maps: Result<(), String>,
+    pub maps: Result<(), Reason>,
     /// Whether there is a map file that the device can read; `Err` says why not.
-    pub map_file: Result<(), String>,
+    pub map_file: Result<(), Reason>,
     /// Whether the vehicle may drive; `Err` says why not.
-    pub motion: Result<(), String>,
+    pub motion: Result<(), Reason>,
     /// Whether a claim may add to a factsheet that says otherwise. Not for a certificate.
     pub claims_add: bool,
 }
@@ -69,7 +59,7 @@ impl Capabilities {
     ///
     /// # Errors
     /// Why it does not apply at all.
-    pub fn weigh(&self, test: &Test) -> Result<Vec<String>, String> {
+    pub fn weigh(&self, test: &Test) -> Result<Vec<Reason>, Reason> {
         let mut open = Vec::new();
         let hooks = test
             .sections()
@@ -119,29 +109,36 @@ impl Capabilities {
     fn has(&self, need: &Need) -> Gate {
         match need {
             Need::Tap if self.vantage == Vantage::Tap => Gate::Runs,
-            Need::Tap => Gate::Unobservable("it needs the device to connect through the tap".to_owned()),
+            Need::Tap => Gate::Unobservable(Reason::NoTap),
             Need::MapServer => match &self.maps {
                 Ok(()) => Gate::Runs,
                 Err(why) => Gate::Unobservable(why.clone()),
             },
             Need::Hook(name) if self.hooks.iter().any(|hook| hook == name) => Gate::Runs,
-            Need::Hook(name) if self.claims.get(&format!("hook {name}")) == Some(&false) => Gate::NotApplicable(
-                format!("the profile says that the device has nothing for the hook `{name}`"),
-            ),
-            Need::Hook(name) if self.unattended.contains(name) => Gate::Unobservable(format!(
-                "hook `{name}` is a prompt, and nobody can be asked: standard input or standard error is no terminal"
-            )),
-            Need::Hook(name) => Gate::Unobservable(format!("the profile has no hook `{name}` ([hooks.{name}])")),
+            Need::Hook(name) if self.claims.get(&format!("hook {name}")) == Some(&false) => {
+                Gate::NotApplicable(Reason::NothingForHook { hook: name.clone() })
+            }
+            Need::Hook(name) if self.unattended.contains(name) => {
+                Gate::Unobservable(Reason::NobodyToAsk { hook: name.clone() })
+            }
+            Need::Hook(name) => Gate::Unobservable(Reason::NoHook { hook: name.clone() }),
             Need::Profile(name) => match self.statements.get(name) {
                 Some(true) => Gate::Runs,
                 Some(false) if SAMPLE_ACTIONS.iter().any(|sample| sample.name == name) => {
-                    Gate::NotApplicable(format!("the profile says that the device has no `{name}`"))
+                    Gate::NotApplicable(Reason::SampleDenied { sample: name.clone() })
                 }
-                Some(false) => Gate::NotApplicable(format!("`device.{name}` is false in the profile")),
-                None if name == ACTIVE_MAP => Gate::Unobservable(NO_ACTIVE_MAP.to_owned()),
+                Some(false) => Gate::NotApplicable(Reason::StatedFalse {
+                    statement: name.clone(),
+                }),
+                None if name == ACTIVE_MAP => Gate::Unobservable(Reason::NoActiveMap),
                 None => Gate::Unobservable(match SAMPLE_ACTIONS.iter().find(|sample| sample.name == name) {
-                    Some(sample) => format!("the profile does not name `device.{name}`: {}", sample.doc),
-                    None => format!("the profile does not say whether the device is `{name}`"),
+                    Some(sample) => Reason::NoSample {
+                        sample: name.clone(),
+                        what: sample.doc.to_owned(),
+                    },
+                    None => Reason::NotStated {
+                        statement: name.clone(),
+                    },
                 }),
             },
             Need::Action { name, scope } => self.action(name, scope.as_deref()),
@@ -155,7 +152,7 @@ impl Capabilities {
 
     /// Why an action of an order cannot be sent as the test wants: the factsheet lists it with other blocking types
     /// (FACT-15).
-    fn blocks_otherwise(&self, action: &SendAction) -> Option<String> {
+    fn blocks_otherwise(&self, action: &SendAction) -> Option<Reason> {
         let wanted = literal(action.blocking.as_ref()?)?;
         let action_type = match &action.action.kind {
             TermKind::Variable(name) => {
@@ -169,7 +166,10 @@ impl Capabilities {
         let own = listed.find(|listed| listed.get("actionType").and_then(Value::as_str) == Some(action_type))?;
         let types = own.get("blockingTypes")?.as_array()?;
         let allowed = types.is_empty() || types.iter().any(|known| known.as_str() == Some(wanted));
-        (!allowed).then(|| format!("the factsheet does not list: action {action_type} with the blocking type {wanted}"))
+        (!allowed).then(|| Reason::BlockingTypeNotListed {
+            action: action_type.to_owned(),
+            blocking: wanted.to_owned(),
+        })
     }
 
     fn action(&self, name: &str, scope: Option<&str>) -> Gate {
@@ -183,10 +183,14 @@ impl Capabilities {
 
     fn not_required(&self, path: &str) -> Gate {
         let Some(sheet) = &self.factsheet else {
-            return Gate::Unobservable(format!("there is no factsheet that could say whether it needs: {path}"));
+            return Gate::Unobservable(Reason::NoFactsheetOfNeeds {
+                parameter: path.to_owned(),
+            });
         };
         if requires(sheet, path) {
-            return Gate::NotApplicable(format!("the factsheet lists as required: {path}"));
+            return Gate::NotApplicable(Reason::Required {
+                parameter: path.to_owned(),
+            });
         }
         Gate::Runs
     }
@@ -197,23 +201,19 @@ impl Capabilities {
 
     /// Whether it has something, by its names, the most exact one first.
     fn declared(&self, names: &[String], says: impl Fn(&Value) -> Option<bool>) -> Gate {
-        let name = names.first().map_or("", String::as_str);
+        let capability = names.first().cloned().unwrap_or_default();
         let claimed = names.iter().find_map(|name| self.claims.get(name)).copied();
         let listed = self.factsheet.as_ref().map(says);
         match (listed, claimed) {
-            (Some(Some(true)), Some(false)) => Gate::Unobservable(format!(
-                "the factsheet lists what the profile says the device does not have: {name}"
-            )),
-            (Some(Some(false)), Some(true)) if !self.claims_add => Gate::Unobservable(format!(
-                "the factsheet does not list what the profile says the device has: {name}"
-            )),
+            (Some(Some(true)), Some(false)) => Gate::Unobservable(Reason::ListedAndDenied { capability }),
+            (Some(Some(false)), Some(true)) if !self.claims_add => {
+                Gate::Unobservable(Reason::ClaimedAndNotListed { capability })
+            }
             (Some(Some(true)), _) | (_, Some(true)) => Gate::Runs,
-            (_, Some(false)) => Gate::NotApplicable(format!("the profile says that the device does not have: {name}")),
-            (Some(Some(false)), None) => Gate::NotApplicable(format!("the factsheet does not list: {name}")),
-            (Some(None), None) => Gate::Unobservable(format!(
-                "the factsheet has no list that could say whether it has: {name}"
-            )),
-            (None, None) => Gate::Unobservable(format!("there is no factsheet that could say whether it has: {name}")),
+            (_, Some(false)) => Gate::NotApplicable(Reason::Denied { capability }),
+            (Some(Some(false)), None) => Gate::NotApplicable(Reason::NotListed { capability }),
+            (Some(None), None) => Gate::Unobservable(Reason::NoList { capability }),
+            (None, None) => Gate::Unobservable(Reason::NoFactsheet { capability }),
         }
     }
 
@@ -320,7 +320,9 @@ fn action_name(name: &str, scope: Option<&str>) -> String {
 
 fn reverse(gate: Gate, name: &str) -> Gate {
     match gate {
-        Gate::Runs => Gate::NotApplicable(format!("the device has what this test needs to be absent: {name}")),
+        Gate::Runs => Gate::NotApplicable(Reason::Present {
+            capability: name.to_owned(),
+        }),
         Gate::NotApplicable(_) => Gate::Runs,
         open @ Gate::Unobservable(_) => open,
     }

@@ -5,13 +5,14 @@
 use serde_json::Value;
 
 use tck_base::pattern::{Piece, Term, TermKind, whole};
+use tck_journal::Reason;
 use tck_suite::model::{Need, Patch, RoutePlace, Send, Test, Verb};
 
 /// The most characters that a variable in an id may stand for.
 const VARIABLE: usize = 64;
 
 /// Why a test is nothing for a vehicle with such a factsheet. A test that is about a limit goes beyond it on purpose.
-pub(super) fn outgrown(sheet: &Value, test: &Test) -> Option<String> {
+pub(super) fn outgrown(sheet: &Value, test: &Test) -> Option<Reason> {
     if test.needs.iter().any(|need| matches!(need, Need::Limit(_))) {
         return None;
     }
@@ -27,8 +28,10 @@ pub(super) fn outgrown(sheet: &Value, test: &Test) -> Option<String> {
             .into_iter()
             .find_map(|(name, size)| Some((name, size, limit(arrays, name).filter(|limit| *limit < size)?)));
         too_many
-            .map(|(name, size, limit)| {
-                format!("the factsheet says that {name} has {limit} elements at most, and {size} are needed")
+            .map(|(name, needed, limit)| Reason::ArrayLimit {
+                array: name.to_owned(),
+                limit,
+                needed,
             })
             .or_else(|| too_long(limits.get("maxStringLens"), send))
     })
@@ -40,7 +43,7 @@ fn limit(limits: Option<&Value>, name: &str) -> Option<u64> {
 }
 
 /// What is wrong with an id that a patch spells out, for a vehicle with such limits. All other ids take the form it wants.
-fn too_long(lengths: Option<&Value>, send: &Send) -> Option<String> {
+fn too_long(lengths: Option<&Value>, send: &Send) -> Option<Reason> {
     let named = send.payload.iter().flat_map(|payload| match &payload.kind {
         TermKind::Map(members) => members.as_slice(),
         _ => &[],
@@ -57,14 +60,10 @@ fn too_long(lengths: Option<&Value>, send: &Send) -> Option<String> {
     let longest = limit(lengths, "idLen");
     let mut ids = named.chain(operations.iter().filter_map(spelled));
     ids.find_map(|(length, digits)| {
-        let longest = longest.filter(|longest| *longest < u64::try_from(length).unwrap_or(u64::MAX));
-        match longest {
-            Some(longest) => Some(format!(
-                "the factsheet says that an id has {longest} characters at most, and up to {length} are needed"
-            )),
-            None if numerical && !digits => {
-                Some("the factsheet says that ids are numbers, and one with letters is needed".to_owned())
-            }
+        let needed = u64::try_from(length).unwrap_or(u64::MAX);
+        match longest.filter(|longest| *longest < needed) {
+            Some(limit) => Some(Reason::IdLimit { limit, needed }),
+            None if numerical && !digits => Some(Reason::NumericalIds),
             None => None,
         }
     })
@@ -142,7 +141,7 @@ mod tests {
     use tck_pack::Role;
 
     /// Why this test is nothing for a vehicle with these limits.
-    fn why(limits: &Value, id: &str) -> Option<String> {
+    fn why(limits: &Value, id: &str) -> Option<Reason> {
         let library = tck_testing::library();
         let tests = library.tests(Role::Agv, &library.rules.packs.latest().id);
         let test = tests.iter().find(|test| test.id.as_str() == id).expect(id);
@@ -171,11 +170,10 @@ mod tests {
         let id = "order-acceptance/node-by-node";
         assert_eq!(why(&nodes(json!(100)), id), None);
         for limit in [json!(1), json!(1.0)] {
-            assert!(
-                why(&nodes(limit), id)
-                    .expect("too many")
-                    .contains("order.nodes has 1 elements")
-            );
+            let Some(Reason::ArrayLimit { array, limit: 1, .. }) = why(&nodes(limit), id) else {
+                panic!("too many");
+            };
+            assert_eq!(array, "order.nodes");
         }
     }
 }

@@ -20,10 +20,9 @@ use super::virtual_run::{Silent, VirtualRun, run_silently};
 use tck_base::clock::WallClock;
 use tck_base::diagnostic::Diagnostic;
 use tck_engine::{Composer, Engine, EngineError, Operator, RecordError, Recorder};
-use tck_journal::Journal;
-use tck_journal::Vantage;
 use tck_journal::event::{Event, Occurrence, Source as Seen};
 use tck_journal::file::JournalWriter;
+use tck_journal::{Journal, Reason, Vantage};
 use tck_judge::Library;
 use tck_judge::RunJudge;
 use tck_net::bench::LinkError;
@@ -45,7 +44,7 @@ pub struct SocketRun {
     /// How the device comes to be there.
     source: Source,
     /// Whether the device can reach the map server; `Err` says why not.
-    maps: Result<(), String>,
+    maps: Result<(), Reason>,
     /// The records of a run that broke off, with which this one goes on; its clock has to go on with theirs.
     pub earlier: Option<Journal>,
     /// Where a device prints that the harness starts itself.
@@ -325,7 +324,7 @@ struct Stage<'a> {
     interrupt: tokio::sync::watch::Receiver<bool>,
     device: DeviceUnderTest,
     request: Request,
-    maps: Result<(), String>,
+    maps: Result<(), Reason>,
     vantage: Vantage,
     clock: WallClock,
     earlier: Option<Journal>,

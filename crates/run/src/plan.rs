@@ -4,15 +4,15 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use serde_json::Value;
 
-use super::capabilities::is_said_by_the_device;
 use super::draw::draw;
 use super::estimate::{self, EDGE, Estimate};
 use super::risk::by_risk;
 use super::session::Setup;
 use tck_course::Layout;
+use tck_journal::Reason;
 use tck_pack::{Pack, Participant, Role};
 use tck_profile::HookAction;
 use tck_suite::model::{Test, Verb};
@@ -67,8 +67,8 @@ pub struct PlanLine {
     /// What becomes of it.
     pub gate: Waits,
     /// Why it does not simply run.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub why: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "as_sentence")]
+    pub why: Option<Reason>,
     /// Whether the vehicle drives.
     pub moves: bool,
     /// The hooks it uses, each as often as it does.
@@ -109,8 +109,8 @@ pub struct RunPlan {
     /// How far the vehicle drives, roughly, in metres.
     pub metres: f64,
     /// Why the vehicle does not move; absent when it may.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub stands_still: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "as_sentence")]
+    pub stands_still: Option<Reason>,
 }
 
 impl RunPlan {
@@ -179,10 +179,10 @@ impl RunPlan {
 
     /// Why tests do not run, with the tests, the reason that stops most of them first.
     #[must_use]
-    pub fn reasons(&self, gate: Waits) -> Vec<(&str, Vec<&str>)> {
-        let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+    pub fn reasons(&self, gate: Waits) -> Vec<(&Reason, Vec<&str>)> {
+        let mut reasons: Vec<(&Reason, Vec<&str>)> = Vec::new();
         for line in self.of_kind(gate) {
-            let why = line.why.as_deref().unwrap_or_default();
+            let Some(why) = &line.why else { continue };
             match reasons.iter_mut().find(|(known, _)| *known == why) {
                 Some((_, tests)) => tests.push(&line.id),
                 None => reasons.push((why, vec![&line.id])),
@@ -200,17 +200,16 @@ impl RunPlan {
 }
 
 /// What becomes of a test, and why. What the profile lacks is said before what only the device can say.
-fn gate(setup: &Setup, test: &Test) -> (Waits, Option<String>) {
+fn gate(setup: &Setup, test: &Test) -> (Waits, Option<Reason>) {
     match setup.capabilities.weigh(test) {
         Err(why) => (Waits::NotApplicable, Some(why)),
         Ok(open) => {
-            let mut lacking = open.iter().filter(|why| !is_said_by_the_device(why));
+            let mut lacking = open.iter().filter(|why| !why.is_said_by_the_device());
             if let Some(why) = lacking.next() {
                 return (Waits::Inconclusive, Some(why.clone()));
             }
             if setup.layout.is_none() && !test.course.nodes.is_empty() {
-                let why = "the profile has no layout, and this test needs nodes ([layout] lif or nodes)".to_owned();
-                return (Waits::Inconclusive, Some(why));
+                return (Waits::Inconclusive, Some(Reason::NoLayout));
             }
             match open.into_iter().next() {
                 Some(why) => (Waits::DependsOnDevice, Some(why)),
@@ -218,6 +217,12 @@ fn gate(setup: &Setup, test: &Test) -> (Waits, Option<String>) {
             }
         }
     }
+}
+
+/// Writes a reason as the sentence that people read.
+#[expect(clippy::ref_option, reason = "serde hands over the field as it is")]
+fn as_sentence<S: Serializer>(why: &Option<Reason>, serializer: S) -> Result<S::Ok, S::Error> {
+    why.as_ref().map(ToString::to_string).serialize(serializer)
 }
 
 fn hooks(test: &Test) -> Vec<String> {

@@ -18,6 +18,7 @@ use super::strikes::Strikes;
 use tck_base::verdict::Verdict;
 use tck_course::Layout;
 use tck_engine::{Engine, EngineError, Operator, Recorder, Watcher};
+use tck_journal::Reason;
 use tck_journal::event::{Event, Gate, Plan, PlannedTest};
 use tck_judge::RunJudge;
 use tck_net::link::Link;
@@ -246,7 +247,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
                 });
             let tests = self.setup.tests.iter().map(|test| PlannedTest {
                 test: test.id.clone(),
-                gate: Gate::Unobservable(why.clone()),
+                gate: Gate::Unobservable(Reason::observed(why.clone())),
             });
             let plan = self.plan(tests.collect());
             self.record_plan(&plan)?;
@@ -275,7 +276,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
                 break;
             }
             if let Some(first) = &failed {
-                plan.tests[at].gate = Gate::Unobservable(format!("left out, because {first} failed (--fail-fast)"));
+                plan.tests[at].gate = Gate::Unobservable(Reason::AfterFailure { test: first.clone() });
                 continue;
             }
             for repetition in 1..=self.setup.repeat {
@@ -290,10 +291,11 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
                 if gone.is_none() && test.device == Role::MasterControl {
                     self.let_it_finish().await?;
                 }
-                let aside = gone.clone().or_else(|| self.strikes.against(test));
+                let aside = gone.clone().map(Reason::observed);
+                let aside = aside.or_else(|| self.strikes.against(test));
                 let ready = match (&aside, &self.halted) {
                     (Some(why), _) => Err(why.clone()),
-                    (None, Some(why)) if test.moves => Err(why.clone()),
+                    (None, Some(why)) if test.moves => Err(Reason::observed(why.clone())),
                     _ => self.bindings(test, number),
                 };
                 let ready = match ready {
@@ -418,7 +420,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         self.revive().await
     }
 
-    fn bindings(&self, test: &Test, number: usize) -> Result<Map<String, Value>, String> {
+    fn bindings(&self, test: &Test, number: usize) -> Result<Map<String, Value>, Reason> {
         let judge = self.engine.recorder.judge();
         let course = course_of(test, self.setup.layout.as_ref(), judge, &self.home)?;
         Ok(own_bindings(test, course, judge, &self.setup.run, number))

@@ -13,8 +13,8 @@ use super::header::HeaderParts;
 use super::session::Setup;
 use tck_base::diagnostic::Diagnostic;
 use tck_course::Layout;
-use tck_journal::Vantage;
 use tck_journal::event::{RunHeader, Setting};
+use tck_journal::{Reason, Vantage};
 use tck_judge::Library;
 use tck_pack::Participant;
 use tck_pack::{Pack, Role};
@@ -81,13 +81,13 @@ pub struct DeviceUnderTest {
     /// Whether a claim may add to a factsheet that says otherwise. Not for a certificate.
     pub claims_add: bool,
     /// Whether a vehicle under test may drive; `Err` says why not.
-    pub motion: Result<(), String>,
+    pub motion: Result<(), Reason>,
     /// Where it may drive.
     pub layout: Option<Layout>,
     /// The mock AGVs it is tested with, when it is a master control.
     pub fleet: Option<Fleet>,
     /// Map files it can read; `Err` says why none is known.
-    pub maps: Result<Vec<Bytes>, String>,
+    pub maps: Result<Vec<Bytes>, Reason>,
     /// Deviations it declares: requirement id to reason.
     pub deviations: BTreeMap<String, String>,
     /// What restricts the statement from the start, one sentence each.
@@ -137,7 +137,7 @@ impl DeviceUnderTest {
             // The vehicles of a fleet are the harness's own.
             Ok(())
         } else {
-            Err("the profile does not allow motion ([motion] allowed = true)".to_owned())
+            Err(Reason::MotionNotAllowed)
         };
         let deviations = profile.deviations.iter();
         Ok(Self {
@@ -161,9 +161,9 @@ impl DeviceUnderTest {
     }
 
     /// Rules motion out. The mock AGVs of a fleet are the harness's own, and go on driving.
-    pub fn stand_still(&mut self, why: &str) {
+    pub fn stand_still(&mut self, why: Reason) {
         if self.fleet.is_none() {
-            self.motion = Err(why.to_owned());
+            self.motion = Err(why);
         }
     }
 
@@ -261,7 +261,7 @@ pub struct BenchFacts {
     /// Names of the hooks that are prompts, where nobody can be asked.
     pub unattended: Vec<String>,
     /// Whether the device can reach the map server; `Err` says why not.
-    pub maps: Result<(), String>,
+    pub maps: Result<(), Reason>,
     /// What the broker does not allow, and what cannot be said therefore.
     pub limits: Vec<String>,
 }
@@ -301,7 +301,7 @@ fn fleet(profile: &Profile, layout: Option<&Layout>, vehicles: usize, pack: &Pac
 
 /// The files of `[maps]`. A vehicle that is not ours is not judged by a file that nobody said it can read; mock AGVs
 /// read any.
-fn map_files(effective: &Effective, by_mock_vehicles: bool) -> Result<Result<Vec<Bytes>, String>, Vec<Diagnostic>> {
+fn map_files(effective: &Effective, by_mock_vehicles: bool) -> Result<Result<Vec<Bytes>, Reason>, Vec<Diagnostic>> {
     let read = effective.profile.maps.iter().map(|file| {
         std::fs::read(file).map(Bytes::from).map_err(|error| {
             let title = format!("the map file {} cannot be read: {error}", file.display());
@@ -310,9 +310,7 @@ fn map_files(effective: &Effective, by_mock_vehicles: bool) -> Result<Result<Vec
     });
     let files: Vec<Bytes> = read.collect::<Result<_, _>>()?;
     if files.is_empty() && !by_mock_vehicles {
-        return Ok(Err(
-            "the profile names no map file that the device can read ([maps] files)".to_owned(),
-        ));
+        return Ok(Err(Reason::NoMapFile));
     }
     Ok(Ok(files))
 }

@@ -3,6 +3,7 @@
 use std::net::IpAddr;
 
 use tck_base::diagnostic::Diagnostic;
+use tck_journal::Reason;
 use tck_net::bench::endpoint::Credentials;
 use tck_net::bench::own::OwnNames;
 use tck_net::bench::tls::TlsFiles;
@@ -114,15 +115,13 @@ pub(super) fn bench_of(
 
 /// Whether a device that connects to this bench can fetch a file from its map server; `Err` says why not. One that the
 /// harness starts runs on this machine.
-pub(super) fn reach(options: &BenchOptions, starts_device: bool) -> Result<(), String> {
+pub(super) fn reach(options: &BenchOptions, starts_device: bool) -> Result<(), Reason> {
     let host = options
         .maps_host
         .as_deref()
         .unwrap_or_else(|| host_of(&options.maps_listen));
     if is_any(host) {
-        return Err(format!(
-            "no device can fetch a map from {host} ([bench] maps-host is the name of this machine as the device knows it)"
-        ));
+        return Err(Reason::MapServerUnreachable { host: host.to_owned() });
     }
     let meets_at = match (&options.broker, options.tap) {
         (BrokerChoice::External { url, .. }, false) => {
@@ -132,9 +131,10 @@ pub(super) fn reach(options: &BenchOptions, starts_device: bool) -> Result<(), S
         _ => host_of(&options.listen),
     };
     if is_this_machine(host) && !is_this_machine(meets_at) && !starts_device {
-        return Err(format!(
-            "a device that connects to {meets_at} cannot fetch a map from {host} ([bench] maps-listen and maps-host)"
-        ));
+        return Err(Reason::MapServerElsewhere {
+            host: host.to_owned(),
+            device: meets_at.to_owned(),
+        });
     }
     Ok(())
 }

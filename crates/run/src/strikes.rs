@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use tck_journal::Reason;
 use tck_suite::model::{Section, Test};
 
 /// So many tests in a row may fail at the same place.
@@ -30,13 +31,13 @@ impl Strikes {
     }
 
     /// Why a test is set aside, if it is.
-    pub(super) fn against(&self, test: &Test) -> Option<String> {
+    pub(super) fn against(&self, test: &Test) -> Option<Reason> {
         let mut own = places(test).filter_map(|place| self.0.get(&place).map(|missed| (place, missed)));
         let (place, missed) = own.find(|(_, missed)| missed.len() >= STRIKES)?;
-        Some(format!(
-            "set aside: the precondition at {place} was not reached in {}",
-            missed.join(", ")
-        ))
+        Some(Reason::SetAside {
+            place,
+            tests: missed.clone(),
+        })
     }
 }
 

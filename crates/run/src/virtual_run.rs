@@ -9,10 +9,9 @@ use super::session::{Finished, Progress, run};
 use super::setup::{BenchFacts, DeviceUnderTest, Request};
 use tck_base::clock::{Moment, Stamp};
 use tck_engine::{Composer, Engine, EngineError, HookOutcome, Operator, Recorder};
-use tck_journal::Journal;
-use tck_journal::Vantage;
 use tck_journal::event::{Event, Occurrence, Setting};
 use tck_journal::file::JournalWriter;
+use tck_journal::{Journal, Reason, Vantage};
 use tck_judge::Library;
 use tck_judge::RunJudge;
 use tck_net::bench::LinkError;
@@ -46,7 +45,7 @@ pub struct VirtualRun {
     /// From where the harness sees.
     pub vantage: Vantage,
     /// Whether the vehicle may drive; `Err` says why not.
-    pub motion: Result<(), String>,
+    pub motion: Result<(), Reason>,
     /// When it begins; virtual time goes on from here.
     pub begun: jiff::Timestamp,
     /// Identifier of the run.
@@ -168,7 +167,7 @@ pub async fn run_virtually(
     let mut tested = DeviceUnderTest::built_in(device, true);
     tested.settings.clone_from(&request.settings);
     if let Err(why) = &request.motion {
-        tested.stand_still(why);
+        tested.stand_still(why.clone());
     }
     let bench = BenchFacts {
         vantage: request.vantage,

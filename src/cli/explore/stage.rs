@@ -15,6 +15,7 @@ use crate::cli::run::{hold, person};
 use crate::ui::Desk;
 use tck_base::clock::WallClock;
 use tck_explore::{ConversationFile, Explored, Purpose, Stage};
+use tck_journal::Reason;
 use tck_journal::file::JournalWriter;
 use tck_judge::Library;
 use tck_judge::RunJudge;
@@ -228,7 +229,7 @@ impl OnStage {
                 };
                 let mut run = SocketRun::of_profile(effective, library, pack, surroundings, place)?;
                 if *still {
-                    run.device.stand_still("motion was ruled out by --no-motion");
+                    run.device.stand_still(Reason::MotionRuledOut);
                 }
                 self.over_sockets(run, request, writer, interrupt)
             }

@@ -131,6 +131,7 @@ fn of(verdict: Option<Verdict>, requirement: &str) -> TestResult {
         not_applicable: None,
         seconds: 1.0,
         reason: None,
+        cause: None,
         maturity: "reviewed".to_owned(),
         maturity_note: None,
         journal: Some((1, 2)),

@@ -9,7 +9,8 @@ use vda5050_tck::pack::Role;
 use vda5050_tck::report::sources::{ClauseSource, HowDecided, MonitorSource, RequirementText, Sources, TestSource};
 use vda5050_tck::result::{
     Answers, Capability, Decision, DeviceIdentity, ExplorationResult, MemberResult, MonitorFinding, MonitorResult,
-    NearestMiss, ProgramEnd, ProgramResult, RequirementResult, RunResult, SaidResult, StepResult, TestResult, Waited,
+    NearestMiss, NotDecided, ProgramEnd, ProgramResult, RequirementResult, RunResult, SaidResult, StepResult,
+    TestResult, Waited,
 };
 use vda5050_tck::verdict::Verdict;
 
@@ -127,6 +128,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
             verdict,
             not_applicable: verdict.is_none().then(evil),
             seconds: f64::MAX,
+            cause: None,
             reason: Some(evil()),
             maturity: "watchlist".to_owned(),
             maturity_note: Some(evil()),
@@ -191,7 +193,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
                 verdict: None,
                 decided_by: Vec::new(),
                 verdicts: Vec::new(),
-                not_decided: Some(evil()),
+                not_decided: Some(NotDecided::Other(evil())),
             },
         ],
         capabilities: vec![Capability {

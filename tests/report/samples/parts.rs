@@ -6,7 +6,8 @@ use vda5050_tck::journal::Event;
 use vda5050_tck::journal::event::{RunHeader, Setting};
 use vda5050_tck::report::json::FORMAT;
 use vda5050_tck::result::{
-    Capability, Decision, DeviceIdentity, MonitorResult, RequirementResult, RunResult, StepResult, TestResult,
+    Capability, Decision, DeviceIdentity, MonitorResult, NotDecided, RequirementResult, RunResult, StepResult,
+    TestResult,
 };
 use vda5050_tck::verdict::{Accumulated, Verdict};
 
@@ -57,6 +58,7 @@ pub fn test(id: &str, title: &str, verdict: Verdict, seconds: f64, decisions: Ve
         not_applicable: None,
         seconds,
         reason: None,
+        cause: None,
         maturity: "reviewed".to_owned(),
         maturity_note: Some("2026-11-22, section 6.6.4".to_owned()),
         journal: None,
@@ -114,11 +116,11 @@ pub fn run(tests: Vec<TestResult>, monitors: Vec<MonitorResult>) -> RunResult {
                 verdicts: Vec::new(),
                 not_decided: match (found, passive, *how) {
                     (Some(_), _, _) | (_, Some(_), _) => None,
-                    (_, _, "none") => {
-                        Some("not testable: what a vehicle keeps secret cannot be seen from outside".to_owned())
-                    }
-                    (_, _, "operator") => Some("not applicable".to_owned()),
-                    _ => Some("not selected".to_owned()),
+                    (_, _, "none") => Some(NotDecided::NotTestable(
+                        "what a vehicle keeps secret cannot be seen from outside".to_owned(),
+                    )),
+                    (_, _, "operator") => Some(NotDecided::NotApplicable(String::new())),
+                    _ => Some(NotDecided::NotSelected),
                 },
             }
         })

@@ -10,9 +10,12 @@ use super::super::said;
 use super::super::watches::Watched;
 use super::RunJudge;
 use tck_base::verdict::{Accumulated, Verdict};
+use tck_journal::Reason;
 use tck_journal::event::Gate;
 use tck_pack::Decided;
-use tck_result::{Capability, Decision, DeviceIdentity, ProgramResult, RequirementResult, RunResult, TestResult};
+use tck_result::{
+    Capability, Decision, DeviceIdentity, NotDecided, ProgramResult, RequirementResult, RunResult, TestResult,
+};
 use tck_suite::model::Test;
 
 /// What restricts a run whose connections cannot be traced to the program that it has started.
@@ -169,8 +172,8 @@ impl RunJudge {
         for test in tests {
             let planned = self.plan.tests.iter().find(|planned| planned.test == test.id);
             let why = match planned.map(|planned| &planned.gate) {
-                Some(Gate::Unobservable(why) | Gate::NotApplicable(why)) => why.as_str(),
-                Some(Gate::Runs) | None => "the run ended before",
+                Some(Gate::Unobservable(why) | Gate::NotApplicable(why)) => Some(why),
+                Some(Gate::Runs) | None => None,
             };
             joined::left_out(test, repeat, why);
         }
@@ -191,6 +194,7 @@ impl RunJudge {
                 not_applicable: None,
                 seconds: 0.0,
                 reason: None,
+                cause: None,
                 maturity: test.maturity.word().to_owned(),
                 maturity_note: test.maturity.note().map(str::to_owned),
                 journal: None,
@@ -201,25 +205,31 @@ impl RunJudge {
             };
             let why = match &planned.gate {
                 Gate::NotApplicable(why) => {
-                    result.not_applicable = Some(why.clone());
+                    result.not_applicable = Some(why.to_string());
+                    result.cause = why.clone().typed();
                     all.push(result);
                     continue;
                 }
                 Gate::Unobservable(why) => why.clone(),
-                Gate::Runs if self.end.is_some() => "the run ended before this test".to_owned(),
+                Gate::Runs if self.end.is_some() => Reason::RunEnded,
                 Gate::Runs => continue,
             };
             result.verdict = Some(Verdict::Inconclusive);
+            let sentence = why.to_string();
             for step in &test.steps {
                 for (requirement, clause) in step.clauses() {
                     if mood(&self.ground.catalogue, &self.ground.pack, requirement.as_str()).is_some() {
-                        result
-                            .decisions
-                            .push(undecided(requirement.as_str(), clause, step.verb_span.place(), &why));
+                        result.decisions.push(undecided(
+                            requirement.as_str(),
+                            clause,
+                            step.verb_span.place(),
+                            &sentence,
+                        ));
                     }
                 }
             }
-            result.reason = Some(why);
+            result.reason = Some(sentence);
+            result.cause = why.typed();
             all.push(result);
         }
         all
@@ -265,9 +275,9 @@ impl RunJudge {
         all
     }
 
-    fn why_not(&self, id: &str, decided: &Decided, tests: &[TestResult], watched: &[Watched]) -> String {
+    fn why_not(&self, id: &str, decided: &Decided, tests: &[TestResult], watched: &[Watched]) -> NotDecided {
         if let Decided::NotTestable { reason } = decided {
-            return format!("not testable: {reason}");
+            return NotDecided::NotTestable(reason.clone());
         }
         let deciding = self.rules.suites.deciding(id).iter();
         let with_test: Vec<&Arc<Test>> = deciding.filter(|test| test.device == self.role).collect();
@@ -276,16 +286,16 @@ impl RunJudge {
                 .iter()
                 .any(|w| w.monitor.checks.iter().any(|b| b.requirement.as_str() == id));
             return if monitored {
-                "nothing came that could have been judged".to_owned()
+                NotDecided::NothingCame
             } else {
-                "no test".to_owned()
+                NotDecided::NoTest
             };
         }
         let reason = with_test.iter().find_map(|test| {
             let result = tests.iter().find(|result| result.id == test.id)?;
             result.not_applicable.clone()
         });
-        reason.map_or_else(|| "not selected".to_owned(), |why| format!("not applicable: {why}"))
+        reason.map_or(NotDecided::NotSelected, NotDecided::NotApplicable)
     }
 }
 

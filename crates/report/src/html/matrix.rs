@@ -5,7 +5,7 @@ use super::view::Badge;
 use crate::sources::{HowDecided, RequirementText, Sources};
 use crate::statement::Counts;
 use tck_base::verdict::Verdict;
-use tck_result::{RequirementResult, RunResult};
+use tck_result::{NotDecided, RequirementResult, RunResult};
 
 /// One chapter.
 pub struct ChapterView {
@@ -92,12 +92,13 @@ fn row(
         .clone()
         .filter(|_| requirement.verdict.is_none());
     // The reason of the catalogue is the better one where the result only has the word.
-    let reason = match known.map(|known| &known.decided) {
-        Some(HowDecided::NotTestable(why)) if gap.as_deref() == Some("not testable") => {
-            Some(format!("not testable: {why}"))
+    let reason = match (known.map(|known| &known.decided), gap) {
+        (Some(HowDecided::NotTestable(why)), Some(NotDecided::NotTestable(own))) if own.is_empty() => {
+            Some(NotDecided::NotTestable(why.clone()))
         }
-        _ => gap,
+        (_, gap) => gap,
     };
+    let reason = reason.map(|why| why.to_string());
     RequirementView {
         anchor: anchors.requirement(&requirement.id).unwrap_or_default(),
         badge: Badge::of_requirement(requirement),

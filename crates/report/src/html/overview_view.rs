@@ -2,7 +2,6 @@
 
 use super::Anchors;
 use super::view::Badge;
-use crate::advice::advice;
 use crate::clean::{line, short};
 use crate::findings::findings;
 use crate::sources::Sources;
@@ -68,7 +67,7 @@ pub fn finding_views(
 pub fn advice_views(result: &RunResult) -> Vec<AdviceView> {
     let rows = groups(result).into_iter().map(|group| AdviceView {
         count: group.count(),
-        advice: short(&line(&advice(group.reason)), 400).into_owned(),
+        advice: short(&line(&group.advice()), 400).into_owned(),
         named: group.named(),
     });
     rows.collect()
