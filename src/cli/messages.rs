@@ -204,7 +204,9 @@ fn message(text: &[u8], begin: Begin, arguments: &Validate, library: &Library) -
         Some((version, Said::NoVersion)) if arguments.protocol.is_none() => packs.nearest(version, None),
         Some((version, _)) => {
             let known: Vec<String> = packs.all().iter().map(|pack| pack.version.to_string()).collect();
-            let at = value.filter(|_| arguments.protocol.is_none()).and_then(|_| place::of(text, "/version"));
+            let at = value
+                .filter(|_| arguments.protocol.is_none())
+                .and_then(|_| place::of(text, "/version"));
             return Checked::refused(
                 begin.at(text, at.map_or(0, |range| range.start)),
                 format!("version {version} is not known to this program ({})", known.join(", ")),
