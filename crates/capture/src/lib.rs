@@ -16,6 +16,7 @@ mod members;
 pub mod merge;
 mod names;
 pub(crate) mod packets;
+mod payload;
 mod recorded;
 mod table;
 pub mod taped;

@@ -9,11 +9,11 @@
 use std::collections::VecDeque;
 use std::io::{self, BufRead, Read as _};
 
-use base64::Engine as _;
 use bytes::Bytes;
 
 use super::members::{Depth, elements, members};
 use super::names::{self, Part};
+use super::payload::bytes_of;
 use super::table::Table;
 use super::{Item, Mapping, Message, Place, clock_text};
 use tck_journal::Record;
@@ -465,29 +465,6 @@ fn at_path<'t>(text: &'t str, path: &str) -> Option<&'t str> {
     let (first, rest) = path.split_once('.')?;
     let (_, value) = whole.iter().rev().find(|(name, _)| name == first)?;
     at_path(value, rest)
-}
-
-/// The bytes of a payload that is written as an object, as a text, or in base64.
-fn bytes_of(written: &str) -> Option<Bytes> {
-    if written == "null" {
-        return Some(Bytes::new());
-    }
-    if !written.starts_with('"') {
-        return Some(Bytes::copy_from_slice(written.as_bytes()));
-    }
-    serde_json::from_str(written).ok().map(bytes_of_text)
-}
-
-/// The bytes of a payload that is written as a text, or in base64.
-pub(super) fn bytes_of_text(text: String) -> Bytes {
-    let is_json = text.trim_start().starts_with(['{', '[']);
-    let decoded = || base64::engine::general_purpose::STANDARD.decode(text.trim()).ok();
-    if let Some(bytes) = (!is_json && text.len() > 4).then(decoded).flatten()
-        && bytes.trim_ascii_start().starts_with(b"{")
-    {
-        return bytes.into();
-    }
-    text.into_bytes().into()
 }
 
 #[cfg(test)]

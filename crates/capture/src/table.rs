@@ -2,8 +2,8 @@
 
 use csv::{ByteRecord, ReaderBuilder};
 
-use super::lines::bytes_of_text;
 use super::names::{self, Part};
+use super::payload::bytes_of_text;
 use super::{Mapping, Message, Place, clock_text};
 
 /// What stands between columns.
