@@ -2,7 +2,7 @@
 
 use serde_json::Map;
 
-use super::presence::{Presence, is_stale, says_online};
+use super::presence::{Presence, gone, is_stale, says_online};
 use super::session::Session;
 use tck_engine::{EngineError, HookOutcome, Operator, Recorder};
 use tck_journal::Vantage;
@@ -50,7 +50,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         };
         // A program that has ended does not come back by itself.
         let down = self.program_is_down();
-        let left = gone(&self.engine.recorder);
+        let left = gone(self.engine.recorder.judge());
         let until = self.engine.link.now().moment + first;
         if down.is_none() && self.engine.watch(until, there).await? {
             return Ok(None);
@@ -186,12 +186,6 @@ async fn off_and_on<L: Link, O: Operator>(session: &mut Session<'_, L, O>) -> Re
         "{missing} within {} after hook `power-cycle`",
         show_duration(waited)
     )))
-}
-
-/// How the device shows without a tap that it is gone.
-pub(super) fn gone(recorder: &Recorder) -> Option<String> {
-    let timeline = recorder.judge().timeline();
-    Some(timeline.gone(timeline.last()?.moment)?.to_string())
 }
 
 fn next_seq(recorder: &Recorder) -> u64 {

@@ -56,6 +56,12 @@ pub(super) fn says_online(judge: &RunJudge) -> bool {
     state == judge.ground().pack.word("connection.online")
 }
 
+/// How the device shows without a tap that it is gone.
+pub(super) fn gone(judge: &RunJudge) -> Option<String> {
+    let timeline = judge.timeline();
+    Some(timeline.gone(timeline.last()?.moment)?.to_string())
+}
+
 /// Whether the device has said nothing for longer than any may, and than it ever did.
 fn is_silent(judge: &RunJudge) -> bool {
     let timeline = judge.timeline();

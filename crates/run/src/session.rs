@@ -7,12 +7,11 @@ use std::time::Duration;
 use serde_json::{Map, Value};
 use tokio::sync::watch;
 
-use super::between::gone;
 use super::bindings::{course_of, own_bindings};
 use super::capabilities::Capabilities;
 use super::draw::draw;
 use super::estimate::{self, Estimate, Outlook};
-use super::presence::Presence;
+use super::presence::{Presence, gone};
 use super::rest::{Home, Obstacle};
 use super::risk::by_risk;
 use super::strikes::Strikes;
@@ -445,7 +444,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         if Presence::of(self.engine.recorder.judge(), self.setup.capabilities.vantage).is_there() {
             return Ok(None);
         }
-        let gone = gone(&self.engine.recorder);
+        let gone = gone(self.engine.recorder.judge());
         let gone = gone.as_deref().unwrap_or("the device is not connected");
         self.progress.note(&format!("{gone}; waiting for it"));
         self.revive().await
