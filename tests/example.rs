@@ -33,11 +33,9 @@ fn make(folder: &Path) {
         "order-update/",
         "cancel-order/while-driving",
     ];
-    request.tests = library.tests(Role::Agv, &pack.id);
     request
         .tests
         .retain(|test| wanted.iter().any(|prefix| test.id.starts_with(prefix)));
-    request.complete = false;
     request.faults = vec!["outdated-update-taken-over".to_owned()];
     request.begun = "2026-01-01T08:00:00Z".parse().expect("a time");
     "example".clone_into(&mut request.run);
