@@ -11,7 +11,6 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use vda5050_tck::pack::Role;
 use vda5050_tck::report::junit::Inconclusive;
 use vda5050_tck::run::{Bundle, VirtualRun, run_silently, sources, write_all};
 
