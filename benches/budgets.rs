@@ -18,7 +18,7 @@ use vda5050_tck::explore::{Coverage, Exploration, Grammar};
 use vda5050_tck::judge::judge;
 use vda5050_tck::link::mqtt::{BenchOptions, MqttBench};
 use vda5050_tck::pack::Role;
-use vda5050_tck::run::{VirtualRun, run_silently};
+use vda5050_tck::run::{Selection, VirtualRun, run_silently};
 
 /// What was measured.
 struct Measured {
@@ -155,10 +155,8 @@ fn exploration() -> Vec<Measured> {
         .iter()
         .map(|(_, file)| (file.place(explore.grammar.side()), file.text.clone()));
     let mut request = VirtualRun::of_role(Role::Agv, &library, &pack);
-    request.tests = library
-        .add(&files.collect::<Vec<_>>())
-        .unwrap_or_else(|all| panic!("{}", all[0]));
-    request.complete = false;
+    let tests = library.add(&files.collect::<Vec<_>>());
+    request.tests = Selection::some(tests.unwrap_or_else(|all| panic!("{}", all[0])));
     request.draw = None;
     run_silently(&library, &pack, request).unwrap();
     let seconds = begun.elapsed().as_secs_f64();

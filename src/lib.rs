@@ -1,47 +1,37 @@
 //! Conformance test harness for VDA 5050.
 //!
-//! The folder tree is the architecture; dependencies point one way, from the command line down to the
-//! verdict lattice (`tests/architecture.rs` holds them). Start reading at [`verdict`], then [`journal`],
-//! [`suite::model`] and [`judge`].
-//!
 //! # Test a device
 //!
-//! The device of a profile, over real sockets; [`run::SocketRun`] says what can be chosen:
+//! A test of your own `cargo test` that tests a device by the suites of this crate; [`Tck`] says what can be chosen:
+//!
+//! ```
+//! # fn main() -> Result<(), vda5050_tck::Error> {
+//! use vda5050_tck::{Role, Tck};
+//!
+//! let tck = Tck::built_in(Role::Agv).select("order-rejection/lower-update-id");
+//! assert!(tck.clone().run()?.conforms());
+//! let outcome = tck.fault("outdated-update-taken-over").run()?;
+//! assert!(!outcome.conforms(), "{outcome}");
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! A device of your own is the device of a profile, over real sockets, with the tests of a folder of yours beside the
+//! built-in ones:
 //!
 //! ```no_run
-//! use std::path::Path;
-//! use vda5050_tck::profile::{self, Surroundings};
-//! use vda5050_tck::run::{Place, RunError, SocketRun};
-//!
-//! # fn main() -> Result<(), RunError> {
-//! let library = vda5050_tck::library(None)?;
-//! let pack = library.rules.packs.latest();
-//! let surroundings = Surroundings::of_process();
-//! let profile = profile::load(Some(Path::new("device.toml")), &[], &surroundings)?;
-//! let run = SocketRun::of_profile(&profile, &library, pack, &surroundings, Place::default())?;
-//! let finished = run.carry_out_silently(&library, pack)?;
-//! println!("{:?}", finished.result.verdict);
+//! # fn main() -> Result<(), vda5050_tck::Error> {
+//! let outcome = vda5050_tck::Tck::of_profile("device.toml").suites("conformance").select("acme").run()?;
+//! outcome.write("target/reports")?;
+//! assert!(outcome.conforms(), "{outcome}");
 //! # Ok(())
 //! # }
 //! ```
 //!
-//! A built-in device in virtual time, with one of its faults:
-//!
-//! ```
-//! use vda5050_tck::run::{RunError, VirtualRun, run_silently};
-//! use vda5050_tck::verdict::Verdict;
-//!
-//! # fn main() -> Result<(), RunError> {
-//! let library = vda5050_tck::library(None)?;
-//! let pack = library.rules.packs.latest();
-//! let mut run = VirtualRun::of(&library, pack);
-//! run.tests.retain(|test| test.id == "order-rejection/lower-update-id");
-//! run.faults = vec!["outdated-update-taken-over".to_owned()];
-//! let finished = run_silently(&library, pack, run)?;
-//! assert_eq!(finished.result.verdict, Some(Verdict::Fail));
-//! # Ok(())
-//! # }
-//! ```
+//! [`library`] reads suites, [`RequestBuilder`] chooses what a run takes on. Everything below stands in crates of its own,
+//! which are named here, too, for the program and its tests, and give no promise to stay as they are. The folder tree is the
+//! architecture; dependencies point one way, from the command line down to the verdict lattice (`tests/architecture.rs`
+//! holds them).
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
@@ -51,30 +41,62 @@
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 mod assets;
+#[doc(hidden)]
 pub mod cli;
+mod facade;
+#[doc(hidden)]
 pub mod ui;
 
 pub use assets::{Own, embedded, library};
+pub use facade::{Error, Outcome, Tck};
+pub use tck_base::verdict::Verdict;
+pub use tck_pack::Role;
+pub use tck_result::RunResult;
+pub use tck_run::{Criteria, Request, RequestBuilder, Selection};
+
+#[doc(hidden)]
 pub use tck_audit as audit;
+#[doc(hidden)]
 pub use tck_base::{clock, diagnostic, nurbs, pattern, secrets, verdict, yaml};
+#[doc(hidden)]
 pub use tck_capture as capture;
+#[doc(hidden)]
 pub use tck_check as check;
+#[doc(hidden)]
 pub use tck_checks as checks;
+#[doc(hidden)]
 pub use tck_course as course;
+#[doc(hidden)]
 pub use tck_engine as engine;
+#[doc(hidden)]
 pub use tck_explore as explore;
+#[doc(hidden)]
 pub use tck_journal as journal;
+#[doc(hidden)]
 pub use tck_judge as judge;
+#[doc(hidden)]
 pub use tck_net::{bench, broker, link, maps, tap};
+#[doc(hidden)]
 pub use tck_pack as pack;
+#[doc(hidden)]
 pub use tck_profile as profile;
+#[doc(hidden)]
 pub use tck_qualify as qualify;
+#[doc(hidden)]
 pub use tck_reference as reference;
+#[doc(hidden)]
 pub use tck_report as report;
+#[doc(hidden)]
 pub use tck_result as result;
+#[doc(hidden)]
 pub use tck_run as run;
+#[doc(hidden)]
 pub use tck_simulate as simulate;
+#[doc(hidden)]
 pub use tck_suite as suite;
+#[doc(hidden)]
 pub use tck_view as view;
+#[doc(hidden)]
 pub use tck_watch as watch;
+#[doc(hidden)]
 pub use tck_wire as wire;

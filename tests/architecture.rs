@@ -11,11 +11,12 @@ use std::path::{Path, PathBuf};
 
 /// Rooms by layer; an arrow may point to the same layer or down, never up, and there are no circles on one layer. A room
 /// is a crate below `crates/`, a folder of the two crates that hold several (`base` and `net`), or a folder of the program.
-const LAYERS: [(&str, u8); 40] = [
+const LAYERS: [(&str, u8); 41] = [
     ("main", 6),
     ("cli", 6),
     ("ui", 6),
     ("assets", 6),
+    ("facade", 6),
     ("run", 5),
     ("qualify", 5),
     ("audit", 5),
@@ -55,8 +56,9 @@ const LAYERS: [(&str, u8); 40] = [
 ];
 
 /// The rooms that share a crate with others: of the crates of several rooms and of the program.
-const HELD_TOGETHER: [&str; 18] = [
+const HELD_TOGETHER: [&str; 19] = [
     "main",
+    "facade",
     "cli",
     "ui",
     "assets",

@@ -13,7 +13,6 @@ fn a_master_control_that_floods_its_vehicle_ends_the_run_and_is_failed() {
     request
         .tests
         .retain(|test| test.id == "capabilities/time-between-orders" || test.id.starts_with("dispatch/"));
-    request.complete = false;
     let last = request.tests.last().unwrap().id.clone();
     let finished = run_silently(&library, pack, request).unwrap();
     let End::Flooded(why) = &finished.end else {

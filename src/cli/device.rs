@@ -1,27 +1,9 @@
-//! What the command line, the profile and the packs say about the device, put together.
-
-use std::sync::Arc;
+//! What the command line says about a built-in device.
 
 use super::problem::Problem;
 use tck_base::diagnostic::Diagnostic;
-use tck_judge::Library;
-use tck_pack::{Pack, Role};
-use tck_profile::Effective;
+use tck_pack::Role;
 use tck_simulate::BuiltIn;
-
-/// The protocol version the device is judged by.
-pub(super) fn pack_of(library: &Library, effective: &Effective) -> Result<Arc<Pack>, Problem> {
-    let packs = &library.rules.packs;
-    let Some(wanted) = &effective.profile.device.protocol else {
-        return Ok(Arc::clone(packs.latest()));
-    };
-    packs.get(wanted).cloned().ok_or_else(|| {
-        let known: Vec<String> = packs.all().iter().map(|pack| pack.version.to_string()).collect();
-        let title = format!("there is no protocol version {wanted}");
-        let diagnostic = effective.complain("device.protocol", "unknown-version", title, "this version");
-        diagnostic.hint(format!("known versions: {}", known.join(", "))).into()
-    })
-}
 
 /// Refuses a fault the reference device of this role does not have.
 pub(super) fn check_faults(role: Role, faults: &[String]) -> Result<(), Problem> {

@@ -49,18 +49,9 @@ impl Gate<'_> {
         // Verdicts are joined elsewhere; that nothing was left out on the way is held here once more.
         match exit {
             Exit::Conforms if statement::trouble(self.result).is_some() => Exit::Undecided,
-            Exit::Conforms if !self.result.tests.iter().all(is_settled) => Exit::Undecided,
+            Exit::Conforms if !self.result.tests.iter().all(statement::is_settled) => Exit::Undecided,
             exit => exit,
         }
-    }
-}
-
-/// Whether a test was decided, as often as it was to be run, or does not apply.
-fn is_settled(test: &tck_result::TestResult) -> bool {
-    match statement::test_verdict(test) {
-        None => true,
-        Some(Verdict::Pass | Verdict::Warning | Verdict::Fail) => test.left_out() == 0,
-        Some(Verdict::Inconclusive | Verdict::Error) => false,
     }
 }
 

@@ -145,7 +145,7 @@ fn filtered(arguments: &List, library: &Library, pack: &Pack, role: Role) -> Res
             all.extend(library.tests(other, &pack.id));
         }
     }
-    super::expression::meant(filter, &all, &own, &quoted)
+    tck_run::meant(filter, &all, &own, &quoted)
 }
 
 fn tests(all: &[Arc<Test>], role: Role) -> String {

@@ -33,11 +33,7 @@ pub(super) fn show(plan: &RunPlan, format: Format) -> Result<Exit, Problem> {
 
 /// What `validate` says about a profile that `run` would take.
 pub(super) fn validated(effective: &Effective, library: &Library) -> Result<String, Vec<Diagnostic>> {
-    let pack = match super::device::pack_of(library, effective) {
-        Ok(pack) => pack,
-        Err(Problem::Usage(all)) => return Err(all),
-        Err(other) => return Err(vec![Diagnostic::whole("profile", other.render(false))]),
-    };
+    let pack = tck_run::pack_of(library, effective).map_err(|wrong| vec![wrong])?;
     let surroundings = Surroundings::of_process();
     let run = SocketRun::of_profile(effective, library, &pack, &surroundings, Place::default())?;
     let layout = run.device.layout.as_ref().map_or("no layout".to_owned(), |layout| {

@@ -7,6 +7,7 @@ use tck_base::diagnostic::{Diagnostic, Span};
 use super::exit::Exit;
 use tck_journal::tool;
 use tck_report::no_result::{NoResult, Obstacle};
+use tck_run::SelectionError;
 
 /// What went wrong, by who can put it right.
 #[derive(Debug)]
@@ -98,6 +99,15 @@ fn shown(one: &Diagnostic) -> Value {
 impl From<Vec<Diagnostic>> for Problem {
     fn from(all: Vec<Diagnostic>) -> Self {
         Self::Usage(all)
+    }
+}
+
+impl From<SelectionError> for Problem {
+    fn from(error: SelectionError) -> Self {
+        match error {
+            SelectionError::Wrong(wrong) => (*wrong).into(),
+            SelectionError::Nothing(why) => Self::NothingToDo(why),
+        }
     }
 }
 

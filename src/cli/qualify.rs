@@ -44,7 +44,7 @@ pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
         let is_asked = |fault: &&Fault| !named || arguments.fault.iter().any(|name| name == fault.name);
         let faults: Vec<Fault> = BuiltIn::faults(role).iter().filter(is_asked).copied().collect();
         let all = library.tests(role, &pack.id);
-        match super::select::select(&all, &arguments.tests) {
+        match tck_run::select(&all, &arguments.tests) {
             Ok(tests) => jobs.push((role, pack, tests, faults)),
             Err(problem) => {
                 refused.get_or_insert(problem);

@@ -13,8 +13,8 @@ use tokio::sync::watch;
 
 use resume::{AboutRun, Earlier};
 
-use super::args::{self, Shard};
-use super::device::{check_faults, pack_of, tolerate};
+use super::args;
+use super::device::{check_faults, tolerate};
 use super::ending::Ending;
 use super::events::{About, Followed};
 use super::exit::Exit;
@@ -37,8 +37,8 @@ use tck_pack::{Pack, Role};
 use tck_profile::{self as profile, Effective, Surroundings};
 use tck_report::statement::many;
 use tck_run::{
-    Bundle, Hold, LATEST, Person, Place, Request, RunError, RunPlan, SocketRun, VirtualRun, going_on_at, run_virtually,
-    write_result,
+    Bundle, Criteria, Hold, LATEST, Person, Place, Request, RequestBuilder, RunError, RunPlan, SocketRun, VirtualRun,
+    going_on_at, pack_of, run_virtually, write_result,
 };
 use tck_simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
 
@@ -75,45 +75,11 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
     }
     let pack = pack_of(&library, &effective)?;
     let role = effective.profile.device.role;
-    let all = library.tests(role, &pack.id);
     let earlier = match &arguments.selection.resume {
-        Some(folder) => Some(Earlier::read(folder, &all, &library)?),
+        Some(folder) => Some(Earlier::read(folder, &library.tests(role, &pack.id), &library)?),
         None => None,
     };
-    let mut tests = match &earlier {
-        Some(earlier) => earlier.tests.clone(),
-        None => super::selection::selected(
-            &all,
-            &arguments.tests,
-            &arguments.selection,
-            &arguments.output.out,
-            &library,
-            &pack,
-        )?,
-    };
-    if let Some(shard) = arguments.shard {
-        let mut place = 0;
-        tests.retain(|_| {
-            place += 1;
-            shard.takes(place - 1)
-        });
-    }
-    if tests.is_empty() {
-        return Err(Problem::NothingToDo("no test was selected".to_owned()));
-    }
-    let random = uuid::Uuid::new_v4();
-    let run = match arguments.seed {
-        Some(seed) => format!("seed{seed}"),
-        None => random.simple().to_string()[..8].to_owned(),
-    };
-    // Whoever names a single case means it; the parts of one run have to draw the same.
-    let whole = arguments.thorough || earlier.is_some() || arguments.tests.iter().any(|pattern| pattern.contains('['));
-    let draw = match arguments.seed {
-        _ if whole => None,
-        Some(seed) => Some(seed),
-        None if arguments.shard.is_some() || arguments.certificate => Some(1),
-        None => Some(u64::from(random.as_fields().0)),
-    };
+    let request = asked(arguments, earlier.as_ref()).build(role, &library, &pack)?;
     if role == Role::MasterControl && arguments.vehicle.0 != tck_simulate::Vehicle::default() {
         let title = "`--vehicle` is for the reference AGV, and a master control is tested here";
         return Err(Diagnostic::whole("usage", title).into());
@@ -127,25 +93,7 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
     check_faults(role, &arguments.fault)?;
     let mut job = Job {
         desk: Desk::new(watch::channel(false).0),
-        request: Request {
-            complete: earlier
-                .as_ref()
-                .map_or(tests.len() == all.len(), |earlier| earlier.complete),
-            tests,
-            draw,
-            run,
-            command: std::env::args().collect(),
-            fail_fast: arguments.selection.fail_fast,
-            repeat: match &earlier {
-                Some(earlier) => earlier.repeat.max(arguments.selection.repeat),
-                None => arguments.selection.repeat,
-            },
-            certifies: arguments.certifies,
-            limits: Vec::from_iter(arguments.shard.map(|shard| {
-                let Shard { index, of } = shard;
-                format!("Only part {index} of {of} of the tests was run (--shard): what the other parts found is not in here.")
-            })),
-        },
+        request,
         library,
         pack,
         effective,
@@ -193,6 +141,45 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
     runtime.shutdown_background();
     desk.at_rest();
     outcome
+}
+
+/// What the command line asks for.
+fn asked(arguments: &args::Run, earlier: Option<&Earlier>) -> RequestBuilder {
+    let wanted = &arguments.selection;
+    let repeat = earlier.map_or(1, |earlier| earlier.repeat).max(wanted.repeat);
+    let mut asked = RequestBuilder::new()
+        .criteria(Criteria {
+            patterns: arguments.tests.clone(),
+            requirements: wanted.requirement.clone(),
+            chapters: wanted.chapter.clone(),
+            filters: wanted.filter.clone(),
+            exclude: wanted.exclude.clone(),
+            failed_in: wanted.last_failed.then(|| arguments.output.out.clone()),
+        })
+        .command(std::env::args().collect())
+        .repeat(repeat);
+    if let Some(earlier) = earlier {
+        asked = asked.left(earlier.tests.clone());
+    }
+    if let Some(shard) = arguments.shard {
+        asked = asked.shard(shard);
+    }
+    if let Some(seed) = arguments.seed {
+        asked = asked.seed(seed);
+    }
+    if arguments.thorough {
+        asked = asked.thorough();
+    }
+    if arguments.certificate {
+        asked = asked.same_draw();
+    }
+    if arguments.certifies {
+        asked = asked.certifies();
+    }
+    if wanted.fail_fast {
+        asked = asked.fail_fast();
+    }
+    asked
 }
 
 /// Who keeps hold of a device that a run starts, and where it is said at once what becomes of it.
@@ -286,7 +273,6 @@ impl Job {
         run.device = device;
         run.faults.clone_from(&arguments.fault);
         run.tests.clone_from(&self.request.tests);
-        run.complete = self.request.complete;
         run.draw = self.request.draw;
         run.seed = arguments.seed.unwrap_or(1);
         run.begun = utc;

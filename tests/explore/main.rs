@@ -9,7 +9,7 @@ mod shrinking;
 use vda5050_tck::explore::{Chain, ConversationFile, Finding, Grammar, findings};
 use vda5050_tck::judge::Library;
 use vda5050_tck::pack::Role;
-use vda5050_tck::run::{VirtualRun, run_silently};
+use vda5050_tck::run::{Selection, VirtualRun, run_silently};
 
 /// The allocator of the program: a run is a million small trees.
 #[global_allocator]
@@ -35,9 +35,8 @@ fn found(
     let tests = library.add(&places.collect::<Vec<_>>()).unwrap_or_default();
     assert_eq!(tests.len(), conversations.len(), "every conversation is a test");
     let mut run = VirtualRun::of_role(role, library, &pack);
-    run.tests = tests;
+    run.tests = Selection::some(tests);
     run.draw = None;
-    run.complete = false;
     change(&mut run);
     findings(&run_silently(library, &pack, run).unwrap().result, conversations)
 }

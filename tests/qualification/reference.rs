@@ -130,7 +130,6 @@ fn what_must_not_come_is_found_under_the_older_name_of_the_array() {
         let mut request = VirtualRun::of_role(Role::MasterControl, &library, pack);
         request.tests.retain(|one| one.id == test);
         request.draw = None;
-        request.complete = false;
         request.faults = vec!["actions-renamed".to_owned(), fault.to_owned()];
         let result = run_silently(&library, pack, request).expect("a run").result;
         let found = decided(&result).into_iter().any(|(decider, verdict)| {
@@ -151,7 +150,6 @@ fn what_a_broken_report_hides_is_not_held_against_the_vehicle() {
     request
         .tests
         .retain(|one| one.id == "order-acceptance/execution-begins");
-    request.complete = false;
     request.faults = vec!["order-id-reset-when-done".to_owned()];
     let result = run_silently(&library, pack, request).expect("a run").result;
     let verdicts = |requirement: &str| -> Vec<Verdict> {

@@ -11,7 +11,7 @@ use super::{Chain, ConversationFile, Coverage, Exploration, Grammar, Source, fin
 use tck_judge::Library;
 use tck_pack::{Pack, Role};
 use tck_result::{Answers, ExplorationResult, SaidResult};
-use tck_run::{VirtualRun, run_silently};
+use tck_run::{Selection, VirtualRun, run_silently};
 
 const ROLES: [Role; 2] = [Role::Agv, Role::MasterControl];
 
@@ -178,9 +178,8 @@ fn found(role: Role, faults: &[&str], seed: u64, conversations: usize) -> Vec<su
     let tests = library.add(&places(&grammar, &files)).expect("tests");
     let pack = library.rules.packs.latest().clone();
     let mut run = VirtualRun::of_role(role, &library, &pack);
-    run.tests = tests;
+    run.tests = Selection::some(tests);
     run.draw = None;
-    run.complete = false;
     run.faults = faults.iter().map(|&fault| fault.to_owned()).collect();
     let finished = run_silently(&library, &pack, run).expect("a run");
     for test in &finished.result.tests {

@@ -10,7 +10,7 @@ use tck_engine::EngineError;
 use tck_judge::Library;
 use tck_pack::Pack;
 use tck_reference::Fault;
-use tck_run::{VirtualRun, run_silently};
+use tck_run::{Selection, VirtualRun, run_silently};
 use tck_suite::model::Test;
 
 /// What one fault did.
@@ -114,8 +114,7 @@ impl Grounds<'_> {
                 continue;
             }
             let request = VirtualRun {
-                tests,
-                complete: false,
+                tests: Selection::some(tests),
                 draw,
                 faults: vec![fault.name.to_owned()],
                 ..vehicle.request.clone()

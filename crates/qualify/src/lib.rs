@@ -27,7 +27,7 @@ use tck_engine::EngineError;
 use tck_judge::Library;
 use tck_pack::{Pack, Role};
 use tck_reference::Fault;
-use tck_run::{VirtualRun, run_silently};
+use tck_run::{Selection, VirtualRun, run_silently};
 use tck_simulate::BuiltIn;
 use tck_suite::model::Test;
 
@@ -63,7 +63,7 @@ pub fn qualify(
     for device in BuiltIn::variants(role, pack) {
         let mut request = VirtualRun {
             device,
-            tests: tests.to_vec(),
+            tests: Selection::all(tests.to_vec()),
             ..VirtualRun::of_role(role, library, pack)
         };
         let result = run_silently(library, pack, request.clone())?.result;
@@ -74,7 +74,6 @@ pub fn qualify(
             // What also runs on the usual vehicle is proven there.
             let is_own = |id: &str| own.iter().any(|decider| decider.place.split(' ').next() == Some(id));
             request.tests.retain(|test| is_own(test.table()));
-            request.complete = false;
         }
         vehicles.push(Vehicle {
             request,

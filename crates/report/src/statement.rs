@@ -83,6 +83,16 @@ pub fn test_verdict(test: &TestResult) -> Option<Verdict> {
     }
 }
 
+/// Whether a test was decided, as often as it was to be run, or does not apply.
+#[must_use]
+pub fn is_settled(test: &TestResult) -> bool {
+    match test_verdict(test) {
+        None => true,
+        Some(Verdict::Pass | Verdict::Warning | Verdict::Fail) => test.left_out() == 0,
+        Some(Verdict::Inconclusive | Verdict::Error) => false,
+    }
+}
+
 /// Counts of the monitors; `none` is *nothing to judge*.
 #[must_use]
 pub fn monitors(result: &RunResult) -> Counts {

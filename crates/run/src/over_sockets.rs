@@ -13,8 +13,10 @@ use super::hooks::Means;
 use super::operators::{Commands, hooks_of};
 use super::person::Person;
 use super::plan::{How, RunPlan};
+use super::request::Request;
+use super::selection::Selection;
 use super::session::{Finished, Patience, Progress, run};
-use super::setup::{BenchFacts, DeviceUnderTest, Request};
+use super::setup::{BenchFacts, DeviceUnderTest};
 use super::site::{Topics, bench_of, certificates, reach, resolve};
 use super::virtual_run::{Silent, VirtualRun, run_silently};
 use tck_base::clock::WallClock;
@@ -392,7 +394,7 @@ impl Stage<'_> {
 fn factsheet_of(device: &BuiltIn, library: &Library, pack: &Pack) -> Option<Value> {
     let mut run = VirtualRun::of_role(device.role(), library, pack);
     run.device = device.clone();
-    run.tests = Vec::new();
+    run.tests = Selection::default();
     let finished = run_silently(library, pack, run).ok()?;
     let timeline = finished.recorder.judge().timeline();
     let sheets = timeline.of("factsheet");

@@ -10,6 +10,7 @@ use serde_json::{Map, Value};
 use super::capabilities::Capabilities;
 use super::claims::{claims, statements};
 use super::header::HeaderParts;
+use super::request::Request;
 use super::session::Setup;
 use tck_base::diagnostic::Diagnostic;
 use tck_course::Layout;
@@ -22,48 +23,6 @@ use tck_profile::{Effective, Profile, TimeLimits};
 use tck_simulate::BuiltIn;
 use tck_simulate::ReferenceAgv;
 use tck_simulate::{Fleet, USUAL_FLEET};
-use tck_suite::model::Test;
-
-/// What a run takes on, and what it is called.
-#[derive(Clone, Debug, Default)]
-pub struct Request {
-    /// The tests, in order.
-    pub tests: Vec<Arc<Test>>,
-    /// Whether that is every test of the role and version.
-    pub complete: bool,
-    /// Which cases that come from a schema or a matrix are run; all of them without a seed.
-    pub draw: Option<u64>,
-    /// Identifier of the run; makes ids unique.
-    pub run: String,
-    /// The command line, for the record.
-    pub command: Vec<String>,
-    /// Whether the run ends after the first test that fails.
-    pub fail_fast: bool,
-    /// How often each test is run.
-    pub repeat: u32,
-    /// Whether nothing is left to choose: the run is for a certificate.
-    pub certifies: bool,
-    /// What restricts the statement because of what was asked for, one sentence each.
-    pub limits: Vec<String>,
-}
-
-impl Request {
-    /// All tests of a role and version, with the cases that the seed 1 draws.
-    #[must_use]
-    pub fn all(role: Role, library: &Library, pack: &Pack) -> Self {
-        Self {
-            tests: library.tests(role, &pack.id),
-            complete: true,
-            draw: Some(1),
-            run: uuid::Uuid::new_v4().simple().to_string()[..8].to_owned(),
-            command: Vec::new(),
-            fail_fast: false,
-            repeat: 1,
-            certifies: false,
-            limits: Vec::new(),
-        }
-    }
-}
 
 /// What is known of the device under test before it is there.
 #[derive(Clone, Debug)]
@@ -234,8 +193,8 @@ impl DeviceUnderTest {
             claims_add: self.claims_add,
         };
         let setup = Setup {
-            tests: request.tests,
-            complete: request.complete,
+            complete: request.tests.is_complete(),
+            tests: request.tests.into_tests(),
             draw: request.draw,
             capabilities,
             layout: self.layout,
@@ -264,6 +223,23 @@ pub struct BenchFacts {
     pub maps: Result<(), Reason>,
     /// What the broker does not allow, and what cannot be said therefore.
     pub limits: Vec<String>,
+}
+
+/// The protocol version that a profile says; the latest where it says none.
+///
+/// # Errors
+/// When there is no such version.
+pub fn pack_of(library: &Library, effective: &Effective) -> Result<Arc<Pack>, Diagnostic> {
+    let packs = &library.rules.packs;
+    let Some(wanted) = &effective.profile.device.protocol else {
+        return Ok(Arc::clone(packs.latest()));
+    };
+    packs.get(wanted).cloned().ok_or_else(|| {
+        let known: Vec<String> = packs.all().iter().map(|pack| pack.version.to_string()).collect();
+        let title = format!("there is no protocol version {wanted}");
+        let diagnostic = effective.complain("device.protocol", "unknown-version", title, "this version");
+        diagnostic.hint(format!("known versions: {}", known.join(", ")))
+    })
 }
 
 fn subject(profile: &Profile) -> Result<Participant, Vec<Diagnostic>> {

@@ -1,12 +1,13 @@
 //! A whole run against a built-in device in virtual time, in one process and without a network.
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::{Map, Value};
 
+use super::request::Request;
+use super::selection::Selection;
 use super::session::{Finished, Progress, run};
-use super::setup::{BenchFacts, DeviceUnderTest, Request};
+use super::setup::{BenchFacts, DeviceUnderTest};
 use tck_base::clock::{Moment, Stamp};
 use tck_engine::{Composer, Engine, EngineError, HookOutcome, Operator, Recorder};
 use tck_journal::event::{Event, Occurrence, Setting};
@@ -31,9 +32,7 @@ pub struct VirtualRun {
     /// Names of its faults.
     pub faults: Vec<String>,
     /// The tests, in order.
-    pub tests: Vec<Arc<Test>>,
-    /// Whether that is every test.
-    pub complete: bool,
+    pub tests: Selection,
     /// Which cases that come from a schema are run; all of them without a seed.
     pub draw: Option<u64>,
     /// Seed of the jitter.
@@ -81,8 +80,7 @@ impl VirtualRun {
         Self {
             device,
             faults: Vec::new(),
-            tests: library.tests(role, &pack.id),
-            complete: true,
+            tests: Selection::all(library.tests(role, &pack.id)),
             draw: Some(1),
             seed: 1,
             jitter: Duration::ZERO,
@@ -179,7 +177,6 @@ pub async fn run_virtually(
     let composer = Composer::new(&request.run);
     let asked = Request {
         tests: request.tests,
-        complete: request.complete,
         draw: request.draw,
         run: request.run,
         command: request.command,

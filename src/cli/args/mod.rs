@@ -30,7 +30,7 @@ pub use explore::Explore;
 pub use inspect::{Explain, List, Listing, Report, Validate};
 pub(super) use rendering::to_file;
 pub use rendering::{RenderedTo, Rendering};
-pub use run::{CertificateArgs, Certify, Qualify, Run, Shard};
+pub use run::{CertificateArgs, Certify, Qualify, Run};
 pub use selection::SelectionArgs;
 pub use shell::{Completions, Man};
 pub use simulate::{

@@ -1,11 +1,11 @@
 //! `run`, `certify` and `qualify`: what runs tests.
 
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use clap::Args;
 
 use super::{DeviceArgs, Format, OutputArgs, PipelineArgs, SelectionArgs, SuiteArgs};
+use tck_run::Shard;
 
 const RUN_HELP: &str = "\
 Examples:
@@ -226,37 +226,4 @@ pub struct Qualify {
     /// Which suites.
     #[command(flatten)]
     pub suites: SuiteArgs,
-}
-
-/// One part of a run that several benches share.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shard {
-    /// Which part, counted from 1.
-    pub index: usize,
-    /// Of how many.
-    pub of: usize,
-}
-
-impl Shard {
-    /// Whether the test at a place of the plan, counted from 0, belongs to this part.
-    #[must_use]
-    pub fn takes(self, place: usize) -> bool {
-        place % self.of == self.index - 1
-    }
-}
-
-impl FromStr for Shard {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let parts = text
-            .split_once('/')
-            .and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
-        match parts {
-            Some((index, of)) if (1..=of).contains(&index) => Ok(Self { index, of }),
-            Some((_, 0)) => Err("there is at least one part".to_owned()),
-            Some((index, of)) => Err(format!("there is no part {index} of {of}")),
-            None => Err("a part is written like 2/4: the second of four".to_owned()),
-        }
-    }
 }

@@ -3,6 +3,7 @@
 use clap::CommandFactory as _;
 
 use super::*;
+use tck_run::Shard;
 
 fn parse(line: &str) -> Result<Command, clap::Error> {
     let words = shlex::split(line).expect("words");
@@ -160,7 +161,7 @@ fn every_example_in_a_help_is_a_command_and_names_tests_that_exist() {
             Err(error) => panic!("{line}: {error}"),
         };
         let tests = library.tests(tck_pack::Role::Agv, &protocol);
-        let found = crate::cli::select::select(&tests, &patterns);
+        let found = tck_run::select(&tests, &patterns);
         assert!(
             found.is_ok(),
             "{line}: {}",

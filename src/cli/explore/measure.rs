@@ -13,7 +13,7 @@ use tck_explore::{Chain, ConversationFile, Coverage, Exploration, Finding, findi
 use tck_judge::Library;
 use tck_pack::{Pack, Role};
 use tck_reference::Fault;
-use tck_run::{VirtualRun, run_silently};
+use tck_run::{Selection, VirtualRun, run_silently};
 use tck_simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl};
 use tck_suite::model::Test;
 
@@ -116,8 +116,7 @@ fn told(
         let mut run = VirtualRun::of_role(device.role(), library, pack);
         run.device = device.clone();
         run.faults = fault.iter().map(|fault| fault.name.to_owned()).collect();
-        run.tests.clone_from(tests);
-        run.complete = false;
+        run.tests = Selection::some(tests.clone());
         run.draw = None;
         let finished = run_silently(library, pack, run).map_err(|error| Problem::Environment(error.to_string()))?;
         all.extend(findings(&finished.result, drawn));

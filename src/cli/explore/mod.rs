@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::args::Explore;
-use super::device::{check_faults, pack_of};
+use super::device::check_faults;
 use super::exit::Exit;
 use super::problem::Problem;
 use super::reference::{self, Asked};
@@ -33,7 +33,7 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
         reference::is_tested(&Asked::of_explore(arguments), &effective, &surroundings)?;
     }
     let library = crate::assets::library(arguments.suites.own())?;
-    let pack = pack_of(&library, &effective)?;
+    let pack = tck_run::pack_of(&library, &effective)?;
     let role = effective.profile.device.role;
     check_faults(role, &arguments.fault)?;
     let grammar = Grammar::load(&library.assets, role)
@@ -89,7 +89,7 @@ fn focused(mut grammar: Grammar, focus: &[String]) -> Result<Grammar, Problem> {
     let mut named = BTreeSet::new();
     for pattern in focus {
         let names = grammar.stimuli.keys();
-        let matching: Vec<&String> = names.filter(|name| super::select::matches(pattern, name)).collect();
+        let matching: Vec<&String> = names.filter(|name| tck_run::matches(pattern, name)).collect();
         if matching.is_empty() {
             let names = grammar.stimuli.keys().map(String::as_str);
             let hint = match tck_base::diagnostic::closest(pattern, names) {

@@ -23,7 +23,9 @@ use tck_pack::{Catalogue, Pack, Participant, Role};
 use tck_profile::{Effective, Surroundings};
 use tck_report::junit::Inconclusive;
 use tck_result::RunResult;
-use tck_run::{Bundle, Finished, Place, Request, Silent, SocketRun, VirtualRun, run_virtually, sources, write_all};
+use tck_run::{
+    Bundle, Finished, Place, Request, Selection, Silent, SocketRun, VirtualRun, run_virtually, sources, write_all,
+};
 use tck_simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
 use tck_suite::model::Test;
 
@@ -150,15 +152,11 @@ impl OnStage {
 
     fn request(tests: Vec<Arc<Test>>, run: &str) -> Request {
         Request {
-            tests,
-            complete: false,
-            draw: None,
+            tests: Selection::some(tests),
             run: run.to_owned(),
             command: std::env::args().collect(),
-            fail_fast: false,
             repeat: 1,
-            certifies: false,
-            limits: Vec::new(),
+            ..Request::default()
         }
     }
 
@@ -200,7 +198,6 @@ impl OnStage {
                     device: device.clone(),
                     faults: faults.clone(),
                     tests: request.tests,
-                    complete: false,
                     draw: None,
                     begun: WallClock::start().now().utc,
                     run: request.run,

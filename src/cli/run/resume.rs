@@ -12,6 +12,7 @@ use tck_journal::file::{self, Recording};
 use tck_judge as judge;
 use tck_judge::Library;
 use tck_pack::{Pack, Participant};
+use tck_run::Selection;
 use tck_suite::model::Test;
 
 /// A run that broke off.
@@ -23,10 +24,8 @@ pub(super) struct Earlier {
     pub path: PathBuf,
     /// What it was about.
     header: RunHeader,
-    /// The tests that it has left.
-    pub tests: Vec<Arc<Test>>,
-    /// Whether its plan was made of every test.
-    pub complete: bool,
+    /// The tests that it has left, which are complete if its plan was made of every test.
+    pub tests: Selection,
     /// How many tests are kept.
     pub kept: usize,
     /// How often each of its tests was to be run.
@@ -88,13 +87,18 @@ impl Earlier {
             let why = format!("every planned test of the run in {} is decided", folder.display());
             return Err(Problem::NothingToDo(why));
         }
+        let kept = result.tests.len().saturating_sub(tests.len());
+        let tests = if complete {
+            Selection::all(tests)
+        } else {
+            Selection::some(tests)
+        };
         Ok(Self {
-            kept: result.tests.len().saturating_sub(tests.len()),
             journal,
             path,
             header,
             tests,
-            complete,
+            kept,
             repeat,
         })
     }

@@ -13,14 +13,14 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::select::matches;
+use super::pattern::matches;
 use tck_base::diagnostic::{self, Diagnostic, Source, Span};
 use tck_report::sources::Sources;
 use tck_suite::model::Test;
 
 /// What is asked of a test.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Expression {
+enum Expression {
     /// One of both.
     Or(Box<Self>, Box<Self>),
     /// Both.
@@ -36,7 +36,7 @@ type Place = (usize, usize);
 
 /// One thing that is asked.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Term {
+enum Term {
     /// `test(PATTERN)`, or the pattern alone.
     Test(String),
     /// `requirement(ID)`: it decides this requirement, or one of those whose ids begin so.
@@ -50,13 +50,16 @@ pub(super) enum Term {
 }
 
 /// The names of terms, as they are typed.
-pub(super) const TERMS: [&str; 5] = ["chapter", "hook", "requirement", "tag", "test"];
+const TERMS: [&str; 5] = ["chapter", "hook", "requirement", "tag", "test"];
 
 /// The deepest nesting: an expression is typed by a person.
 const DEEPEST: usize = 64;
 
 /// The tests that an expression means, in their order.
-pub(super) fn meant(
+///
+/// # Errors
+/// When it cannot be read, or a part of it means no test at all.
+pub fn meant(
     text: &str,
     all: &[Arc<Test>],
     among: &[Arc<Test>],
@@ -182,7 +185,7 @@ fn is_section(text: &str) -> bool {
 }
 
 /// Reads an expression.
-pub(super) fn parse(source: &Arc<Source>) -> Result<Expression, Diagnostic> {
+fn parse(source: &Arc<Source>) -> Result<Expression, Diagnostic> {
     let mut parser = Parser {
         source,
         at: 0,

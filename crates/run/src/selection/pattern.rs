@@ -1,4 +1,4 @@
-//! Which tests a pattern of the command line means.
+//! Which tests a pattern means.
 
 use std::sync::Arc;
 
@@ -28,7 +28,8 @@ pub fn select(all: &[Arc<Test>], patterns: &[String]) -> Result<Vec<Arc<Test>>, 
 }
 
 /// A pattern is an id, the group or table before a `/` or `[`, or has `*` for anything.
-pub(super) fn matches(pattern: &str, id: &str) -> bool {
+#[must_use]
+pub fn matches(pattern: &str, id: &str) -> bool {
     let below = |separator: char| id.strip_prefix(pattern).is_some_and(|rest| rest.starts_with(separator));
     id == pattern || below('/') || below('[') || (pattern.contains('*') && glob(pattern.as_bytes(), id.as_bytes()))
 }
