@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use vda5050_tck::bench::Outgoing;
 use vda5050_tck::bench::client::{Client, ClientEvent, ClientOptions};
-use vda5050_tck::bench::endpoint::Endpoint;
+use vda5050_tck::bench::endpoint::{Access, Endpoint};
 use vda5050_tck::explore::{Coverage, Exploration, Grammar};
 use vda5050_tck::judge::judge;
 use vda5050_tck::link::mqtt::{BenchOptions, MqttBench};
@@ -172,7 +172,7 @@ fn exploration() -> Vec<Measured> {
 async fn there_and_back(device: &str, harness: &str, times: usize) -> Vec<f64> {
     let open = async |address: &str, id: &str, topic: &str| {
         let (client, mut events) = Client::open(&ClientOptions {
-            endpoint: Endpoint::parse(address, None, None).unwrap(),
+            endpoint: Endpoint::parse(address, &Access::default()).unwrap(),
             client_id: id.to_owned(),
             keep_alive: Duration::from_secs(30),
             clean_session: true,

@@ -13,7 +13,11 @@ fn root() -> &'static Path {
 }
 
 fn schema() -> jsonschema::Validator {
-    let text = std::fs::read_to_string(root().join("schemas/suite.schema.json")).expect("schema");
+    schema_of("suite")
+}
+
+fn schema_of(what: &str) -> jsonschema::Validator {
+    let text = std::fs::read_to_string(root().join(format!("schemas/{what}.schema.json"))).expect("schema");
     let schema: Value = serde_json::from_str(&text).expect("JSON");
     jsonschema::draft202012::meta::validate(&schema).expect("a schema of 2020-12");
     jsonschema::validator_for(&schema).expect("a schema")
@@ -30,6 +34,52 @@ fn suites_below(folder: &Path, found: &mut Vec<PathBuf>) {
             found.push(path);
         }
     }
+}
+
+/// All files of YAML below a folder.
+fn files_below(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("entry").path();
+        if path.is_dir() {
+            files_below(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "yaml") {
+            found.push(path);
+        }
+    }
+}
+
+#[test]
+fn requirements_and_stimuli_have_schemas_of_their_own() {
+    for (what, folder) in [("requirements", "requirements"), ("explore", "explore")] {
+        let schema = schema_of(what);
+        let mut files = Vec::new();
+        for suites in ["suites", "fixtures/own"] {
+            files_below(&root().join(suites).join(folder), &mut files);
+        }
+        assert!(files.len() > 20, "{what}");
+        for path in files {
+            let value = read(&path).unwrap_or_else(|| panic!("{} is no YAML", path.display()));
+            let objections: Vec<String> = schema.iter_errors(&value).map(|error| error.to_string()).collect();
+            assert!(objections.is_empty(), "{}: {objections:#?}", path.display());
+        }
+    }
+    let own = read(&root().join("fixtures/own/requirements/SYS.yaml")).expect("YAML");
+    let schema = schema_of("requirements");
+    for (member, wrong) in [
+        ("id", serde_json::json!("SYS")),
+        ("link", serde_json::json!("tracker")),
+        ("role", serde_json::json!("agx")),
+        ("reason", serde_json::json!("it is testable")),
+        ("observes", serde_json::json!("x")),
+    ] {
+        let mut broken = own.clone();
+        broken["requirements"][0][member] = wrong;
+        assert!(!schema.is_valid(&broken), "{member}");
+    }
+    let stimuli = read(&root().join("fixtures/own/explore/agv/sys.yaml")).expect("YAML");
+    let mut broken = stimuli.clone();
+    broken["blink"]["sedns"] = "".into();
+    assert!(!schema_of("explore").is_valid(&broken));
 }
 
 fn read(path: &Path) -> Option<Value> {

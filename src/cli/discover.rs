@@ -1,18 +1,19 @@
 //! `discover` and `init`: who speaks on a broker, and a profile from that. Nothing is published.
 
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use serde_json::json;
 
-use super::args::{BrokerArgs, Discover, Format, Init, ListenArgs};
+use super::args::{AccessArgs, Discover, Format, Init, ListenArgs};
 use super::exit::Exit;
 use super::problem::Problem;
 use crate::ui::escaped;
 use tck_base::diagnostic::Diagnostic;
 use tck_judge::Library;
-use tck_net::bench::endpoint::{Credentials, Endpoint};
+use tck_net::bench::endpoint::{Access, Credentials, Endpoint};
+use tck_net::bench::tls::TlsFiles;
 use tck_profile as profile;
 use tck_run::{Device, Heard, Wishes, draft, listen};
 
@@ -65,15 +66,13 @@ pub fn init(arguments: &Init) -> Result<Exit, Problem> {
         [] => return Err(choose("no device of that name was heard", &all)),
         _ => return Err(choose("several devices were heard", &meant)),
     };
+    let at = &arguments.listen.at.access;
+    let file = |path: &Option<PathBuf>| path.as_ref().map(|path| path.display().to_string());
     let wishes = Wishes {
-        broker: arguments.listen.at.broker.clone(),
-        username: arguments.listen.at.username.clone(),
-        tls_ca: arguments
-            .listen
-            .at
-            .tls_ca
-            .as_ref()
-            .map(|file| file.display().to_string()),
+        broker: arguments.listen.at.access.broker.clone(),
+        username: arguments.listen.at.access.username.clone(),
+        tls_ca: file(&at.tls_ca),
+        identity: file(&at.client_cert).zip(file(&at.client_key)),
         lif: arguments.lif.clone(),
         vehicle_type: arguments.vehicle_type.clone(),
     };
@@ -126,18 +125,25 @@ fn export(folder: &Path, format: Format) -> Result<Exit, Problem> {
 }
 
 /// Where the broker is, and how it lets in.
-pub(super) fn endpoint(arguments: &BrokerArgs) -> Result<Endpoint, Problem> {
+pub(super) fn endpoint(arguments: &AccessArgs) -> Result<Endpoint, Problem> {
     let credentials = arguments.username.clone().map(|username| Credentials {
         username,
         password: std::env::var(tck_profile::PASSWORD_VARIABLE).unwrap_or_default(),
     });
-    Endpoint::parse(&arguments.broker, arguments.tls_ca.as_deref(), credentials).map_err(|error| {
+    let identity = arguments.client_cert.clone().zip(arguments.client_key.clone());
+    let access = Access {
+        authority: arguments.tls_ca.clone(),
+        identity: identity.map(|(certificate, key)| TlsFiles { certificate, key }),
+        credentials,
+        client_id: arguments.client_id.clone(),
+    };
+    Endpoint::parse(&arguments.broker, &access).map_err(|error| {
         Problem::from(Diagnostic::whole("broker", error.to_string()).hint("give it as mqtt://host:port"))
     })
 }
 
 fn hear(arguments: &ListenArgs, library: &Library) -> Result<Heard, Problem> {
-    let endpoint = endpoint(&arguments.at)?;
+    let endpoint = endpoint(&arguments.at.access)?;
     let filters = arguments.at.filters();
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
@@ -146,7 +152,7 @@ fn hear(arguments: &ListenArgs, library: &Library) -> Result<Heard, Problem> {
         .map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
     eprintln!(
         "listening on {} for {} s; Ctrl-C ends it earlier",
-        arguments.at.broker, arguments.seconds
+        arguments.at.access.broker, arguments.seconds
     );
     let heard = runtime.block_on(async {
         let interrupt = super::ending::interrupts()?;
@@ -157,7 +163,7 @@ fn hear(arguments: &ListenArgs, library: &Library) -> Result<Heard, Problem> {
     heard?.map_err(|why| {
         Problem::Environment(format!(
             "cannot listen on {} to {}: {why}",
-            arguments.at.broker,
+            arguments.at.access.broker,
             filters.join(", ")
         ))
     })
@@ -166,7 +172,7 @@ fn hear(arguments: &ListenArgs, library: &Library) -> Result<Heard, Problem> {
 fn nobody(arguments: &ListenArgs) -> Problem {
     Problem::NothingToDo(format!(
         "no device was heard on {} in {} s; a broker with access rules may need --username, or --topic with what is allowed",
-        arguments.at.broker, arguments.seconds
+        arguments.at.access.broker, arguments.seconds
     ))
 }
 

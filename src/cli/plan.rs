@@ -163,6 +163,15 @@ fn text(plan: &RunPlan) -> String {
             escaped(&how)
         );
     }
+    if !plan.retained.is_empty() {
+        let _ = writeln!(
+            text,
+            "broker   the mock vehicles keep messages there, which are cleared at the end, or by the next run:"
+        );
+        for topic in &plan.retained {
+            let _ = writeln!(text, "         {}", escaped(topic));
+        }
+    }
     let sections = [
         (Waits::Inconclusive, "To decide more:"),
         (Waits::DependsOnDevice, "Known when the device is there:"),

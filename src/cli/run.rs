@@ -31,6 +31,8 @@ use tck_journal::{Reason, Vantage};
 use tck_judge::Library;
 use tck_judge::RunJudge;
 use tck_net::bench::LinkError;
+use tck_net::bench::endpoint::Access;
+use tck_net::bench::tls::TlsFiles;
 use tck_net::link::mqtt::BrokerChoice;
 use tck_pack::Participant;
 use tck_pack::{Pack, Role};
@@ -324,11 +326,15 @@ impl Job {
         if arguments.device.listen.is_some() {
             run.options.listen.clone_from(&bench.listen);
         }
+        let identity = bench.client_cert.clone().zip(bench.client_key.clone());
         if let Some(url) = &bench.broker {
             run.options.broker = BrokerChoice::External {
                 url: url.clone(),
-                authority: bench.tls_ca.clone(),
-                credentials: None,
+                access: Access {
+                    authority: bench.tls_ca.clone(),
+                    identity: identity.map(|(certificate, key)| TlsFiles { certificate, key }),
+                    ..Access::default()
+                },
             };
         }
         run.device.settings.clone_from(&self.effective.settings);

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use super::args::{ConnectionArgs, Format, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl, SimulatedSite};
+use super::args::{Format, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl, SimulatedSite};
 use super::device::{check_faults, tolerate};
 use super::exit::Exit;
 use super::problem::Problem;
@@ -14,7 +14,7 @@ use super::signals::Signals;
 use tck_base::clock::WallClock;
 use tck_base::diagnostic::{Diagnostic, Source};
 use tck_course::Layout;
-use tck_net::bench::endpoint::{Credentials, Endpoint};
+use tck_net::bench::endpoint::Endpoint;
 use tck_pack::{Pack, Packs, Role};
 use tck_simulate::driver::RunningDevice;
 use tck_simulate::{BuiltIn, Fleet, HookServer, ReferenceAgv, ReferenceMasterControl, Site};
@@ -28,7 +28,7 @@ pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
     };
     let packs = Packs::load(&crate::assets::embedded()).map_err(|error| Problem::Environment(error.to_string()))?;
     let pack = super::pack_among(&packs, connection.protocol.as_deref())?;
-    let endpoint = endpoint(connection)?;
+    let endpoint = super::discover::endpoint(&connection.access)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()
@@ -72,17 +72,6 @@ fn site(arguments: &SimulatedSite) -> Result<Exit, Problem> {
         key.flush().map_err(broken)?;
     }
     Ok(Exit::Conforms)
-}
-
-/// Where the broker is, and how it lets in.
-fn endpoint(connection: &ConnectionArgs) -> Result<Endpoint, Problem> {
-    let credentials = connection.username.clone().map(|username| Credentials {
-        username,
-        password: std::env::var(tck_profile::PASSWORD_VARIABLE).unwrap_or_default(),
-    });
-    Endpoint::parse(&connection.broker, connection.tls_ca.as_deref(), credentials).map_err(|error| {
-        Problem::from(Diagnostic::whole("broker", error.to_string()).hint("give it as mqtt://host:port"))
-    })
 }
 
 /// Says when the broker does not let the device in; later losses are the device's own business.
@@ -138,9 +127,13 @@ async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint, form
         }
         let mut reference = BuiltIn::from(reference);
         tolerate(&mut reference, &device.tolerance)?;
-        let mut agv = start(&reference, &device.fault, endpoint, clock)?;
+        let mut endpoint = endpoint.clone();
+        if let Some(client_id) = endpoint.client_id.as_mut().filter(|_| device.count > 1) {
+            *client_id = format!("{client_id}-{number}");
+        }
+        let mut agv = start(&reference, &device.fault, &endpoint, clock)?;
         if number == 1 {
-            enter(&mut agv, endpoint).await?;
+            enter(&mut agv, &endpoint).await?;
         }
         for persona in &device.persona {
             agv.command(persona.word, persona.parameters.clone()).await;
@@ -163,7 +156,7 @@ async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint, form
             &json!({ "event": "hooks", "address": hooks }),
         )?;
     }
-    let broker = &device.connection.broker;
+    let broker = &device.connection.access.broker;
     let count = device.count;
     say(
         format,
@@ -195,13 +188,20 @@ async fn master_control(
     let mut signals = Signals::listen()?;
     let mut reference = BuiltIn::from(configured(device, pack)?);
     tolerate(&mut reference, &device.tolerance)?;
-    let mut running = start(&reference, &device.fault, endpoint, WallClock::start())?;
-    enter(&mut running, endpoint).await?;
+    // Two of them may live at one broker, and whoever comes under the client id of another one throws it out.
+    let made_up = || {
+        let random = uuid::Uuid::new_v4().simple().to_string();
+        format!("reference-master-control-{}", &random[..8])
+    };
+    let mut endpoint = endpoint.clone();
+    endpoint.client_id.get_or_insert_with(made_up);
+    let mut running = start(&reference, &device.fault, &endpoint, WallClock::start())?;
+    enter(&mut running, &endpoint).await?;
     let server = HookServer::start(&device.hooks, running, reference.hooks()).await;
     let server = server.map_err(|error| Problem::Environment(error.to_string()))?;
     let hooks = format!("http://{}", server.address());
     let vehicles = reference.fleet().map_or(0, |fleet| fleet.vehicles.len());
-    let broker = &device.connection.broker;
+    let broker = &device.connection.access.broker;
     say(
         format,
         &format!(

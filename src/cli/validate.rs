@@ -12,10 +12,13 @@ use super::messages::{self, Counted};
 use super::problem::Problem;
 use tck_base::diagnostic::{Diagnostic, Source};
 use tck_course::Layout;
+use tck_explore::Grammar;
 use tck_journal::place;
 use tck_judge::Library;
+use tck_pack::{Catalogue, Role};
 use tck_profile as profile;
 use tck_report::json as result_file;
+use tck_report::statement::many;
 
 /// A file that is read as a whole may have so many bytes.
 const WHOLE: usize = 32 << 20;
@@ -30,7 +33,7 @@ enum Found {
 
 /// `validate`.
 pub fn validate(arguments: &Validate) -> Result<Exit, Problem> {
-    let library = crate::assets::library(None)?;
+    let library = crate::assets::library(arguments.suites.own())?;
     let mut wrong = 0;
     for path in &expanded(&arguments.files)? {
         let name = path.display().to_string();
@@ -185,10 +188,32 @@ fn check(name: &str, bytes: &[u8], path: &Path, arguments: &Validate, library: &
     if extension == "json" || text.trim_start().starts_with('{') {
         return one(name, bytes, arguments, library);
     }
-    Ok(match library.check_suite(name, text) {
+    let checked = beside_tests(name, text, path, library).unwrap_or_else(|| library.check_suite(name, text));
+    Ok(match checked {
         Ok(what) => Found::Good(what),
         Err(all) => Found::Bad(all),
     })
+}
+
+/// A file of suites that is no test, state or monitor: requirements, or stimuli.
+fn beside_tests(name: &str, text: &str, path: &Path, library: &Library) -> Option<Result<String, Vec<Diagnostic>>> {
+    let has = |key: &str| text.lines().any(|line| line.starts_with(key));
+    if has("requirements:") || has("chapter:") {
+        let count = Catalogue::check_text(name, text);
+        return Some(count.map(|count| format!("a file of {}", many(count, "requirement"))));
+    }
+    let folder = path.parent()?;
+    let role = [Role::Agv, Role::MasterControl]
+        .into_iter()
+        .find(|role| folder.ends_with(Path::new("explore").join(role.word())));
+    let read = match role {
+        _ if has("explore:") => Grammar::read(name, text).map(|_| "a grammar of conversations".to_owned()),
+        Some(role) => {
+            Grammar::check_part(&library.assets, role, name, text).map(|count| format!("a file of {count} stimuli"))
+        }
+        None => return None,
+    };
+    Some(read.map_err(|error| vec![Diagnostic::whole("explore", error.to_string())]))
 }
 
 fn looks_like_toml(text: &str) -> bool {

@@ -21,7 +21,7 @@ pub fn watch(arguments: &Arguments) -> Result<Exit, Problem> {
         keep: arguments.keep,
     };
     let settings = Settings {
-        endpoint: super::discover::endpoint(&arguments.at)?,
+        endpoint: super::discover::endpoint(&arguments.at.access)?,
         listen: arguments.listen.clone(),
         filters: arguments.at.filters(),
         options: Options {
@@ -50,7 +50,7 @@ pub fn watch(arguments: &Arguments) -> Result<Exit, Problem> {
     let mut settings = settings;
     let watched = if whole {
         settings.tick = Duration::from_millis(100);
-        let mut screen = FullScreen::open(arguments.at.broker.clone())
+        let mut screen = FullScreen::open(arguments.at.access.broker.clone())
             .map_err(|error| Problem::Environment(format!("cannot use the whole terminal: {error}; try --plain")))?;
         runtime.block_on(async {
             let interrupt = super::ending::interrupts()?;
@@ -88,7 +88,7 @@ fn problem(arguments: &Arguments, error: &WatchError) -> Problem {
         WatchError::Audit(error) => Diagnostic::whole("watch", error.to_string()).into(),
         WatchError::NeverConnected(why) => Problem::Environment(format!(
             "cannot listen on {} to {}: {why}",
-            arguments.at.broker,
+            arguments.at.access.broker,
             arguments.at.filters().join(", ")
         )),
         WatchError::Link(_) | WatchError::Record(_) => Problem::Environment(error.to_string()),

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use super::output::Output;
 use tck_base::verdict::Verdict;
 use tck_report::clean::{line, short};
+use tck_watch::alarm::Alarmed;
 use tck_watch::glance::Glance;
 use tck_watch::session::{Contact, Happening, Viewer};
 use tck_watch::{Notice, Watch};
@@ -106,6 +107,29 @@ impl<W: Write, E: Write> Viewer for Lines<W, E> {
         let _ = self.notes.line(&text);
     }
 
+    fn alarmed(&mut self, alarmed: &Alarmed) {
+        let Alarmed {
+            manufacturer,
+            serial_number,
+            at,
+            alarm,
+        } = alarmed;
+        if self.options.json {
+            let object = json!({ "kind": "alarm", "at": format!("{at:.3}"), "manufacturer": manufacturer,
+                "serialNumber": serial_number, "alarm": alarm.word(), "text": alarm.to_string() });
+            self.write(&object.to_string());
+            return;
+        }
+        let style = Style::new().red().force_styling(self.options.color);
+        self.write(&format!(
+            "{at:.3} {} {} {}: {}",
+            style.apply_to("ALARM"),
+            line(manufacturer),
+            line(serial_number),
+            line(&alarm.to_string())
+        ));
+    }
+
     fn tick(&mut self, watch: &Watch<'_>, _contact: Contact) -> bool {
         let heard = watch.glances().len();
         if heard > self.known {
@@ -121,7 +145,7 @@ impl<W: Write, E: Write> Viewer for Lines<W, E> {
             .is_some_and(|every| self.summed_up.elapsed() >= every);
         if due {
             self.summed_up = Instant::now();
-            for glance in watch.glances() {
+            for glance in watch.worst_first() {
                 if self.options.json {
                     self.write(&summary_object(glance).to_string());
                 } else {

@@ -186,6 +186,67 @@ fn a_simulated_vehicle_trusts_the_authority_it_is_given() {
 }
 
 #[test]
+fn a_broker_that_asks_for_certificates_is_reached_by_every_command() {
+    let asking = |folder: &Path| {
+        let more = format!("cafile {}/ca.crt\nrequire_certificate true\n", folder.display());
+        secured(folder) + &more
+    };
+    let Some(broker) = Mosquitto::start_with(asking) else {
+        return;
+    };
+    let bench = Bench::new();
+    let url = format!("mqtts://localhost:{}", broker.port);
+    let file = |name: &str| broker.folder().join(name).display().to_string();
+    let (authority, certificate, key) = (file("ca.crt"), file("server.crt"), file("server.key"));
+    let at = ["--broker", &url, "--tls-ca", &authority];
+    let shown = ["--client-cert", &certificate, "--client-key", &key];
+    let listen = ["discover", "--seconds", "2"];
+    bench.run(&[&listen[..], &at].concat()).code(5);
+    let simulate = ["simulate", "agv", "--client-id", "the-only-one"];
+    let mut agv = Running::start(&mut tool(bench.path(), &[&simulate[..], &at, &shown].concat()));
+    agv.line("1 simulated AGV(s) on ");
+    bench.run(&[&listen[..], &at, &shown].concat()).code(0).prints("ONLINE");
+    let init = ["init", "--seconds", "2", "--client-id", "tck-here"];
+    bench.run(&[&init[..], &at, &shown].concat()).code(0);
+    let watched = ["watch", "--plain", "--for", "1s"];
+    let watched = bench.run(&[&watched[..], &at, &shown].concat());
+    assert!(watched.stderr.contains("watching; Ctrl-C ends it"), "{watched:?}");
+    // Whoever comes under the same client id throws it out.
+    let other = [&simulate[..], &at, &shown, &["--serial", "other"]].concat();
+    let mut other = Running::start(&mut tool(bench.path(), &other));
+    other.line("1 simulated AGV(s) on ");
+    // The profile that `init` has written gets in as well.
+    let judged = bench.run(&["run", "--profile", "device.toml", QUICK]);
+    assert!(!matches!(judged.status.code(), Some(2 | 5)), "{judged:?}");
+}
+
+#[test]
+fn two_simulated_master_controls_live_at_one_broker() {
+    let logging = |folder: &Path| {
+        let log = folder.join("log").display().to_string();
+        format!("user root\nallow_anonymous true\nlog_type all\nlog_dest file {log}\n")
+    };
+    let Some(broker) = Mosquitto::start_with(logging) else {
+        return;
+    };
+    let bench = Bench::new();
+    let url = broker.url();
+    let simulate = ["simulate", "master-control", "--broker", &url, "--hooks", "127.0.0.1:0"];
+    let both = [(); 2].map(|()| {
+        let mut one = Running::start(&mut tool(bench.path(), &simulate));
+        one.line("hooks are served at ");
+        one
+    });
+    for one in both {
+        one.interrupt();
+        one.end().code(0);
+    }
+    let log = std::fs::read_to_string(broker.folder().join("log")).unwrap();
+    assert!(log.contains("reference-master-control"), "{log}");
+    assert!(!log.contains("already connected"), "{log}");
+}
+
+#[test]
 fn websockets_are_brokers_like_others() {
     let Some(broker) = Mosquitto::start() else { return };
     let folder = tempfile::tempdir().unwrap();

@@ -245,6 +245,64 @@ fn a_simulated_master_control_conforms_and_is_commanded_over_http() {
     }
 }
 
+/// The topics of which a broker keeps a message.
+fn kept(port: u16) -> Vec<String> {
+    let mut options = rumqttc::MqttOptions::new("keeper", "127.0.0.1", port);
+    options.set_max_packet_size(1 << 20, 1 << 20);
+    let (client, mut connection) = rumqttc::Client::new(options, 10);
+    client.subscribe("#", rumqttc::QoS::AtLeastOnce).unwrap();
+    let mut topics = Vec::new();
+    while let Ok(Ok(event)) = connection.recv_timeout(Duration::from_millis(800)) {
+        if let rumqttc::Event::Incoming(rumqttc::Packet::Publish(message)) = event
+            && message.retain
+        {
+            topics.push(message.topic);
+        }
+    }
+    topics.sort();
+    topics
+}
+
+/// Lets a broker keep something on these topics.
+fn keeps(port: u16, topics: &[&str]) {
+    let options = rumqttc::MqttOptions::new("filler", "127.0.0.1", port);
+    let (client, mut connection) = rumqttc::Client::new(options, 10);
+    for topic in topics {
+        client.publish(*topic, rumqttc::QoS::AtLeastOnce, true, "{}").unwrap();
+    }
+    let mut left = topics.len();
+    while left > 0 {
+        if let rumqttc::Event::Incoming(rumqttc::Packet::PubAck(_)) = connection.recv().unwrap().unwrap() {
+            left -= 1;
+        }
+    }
+}
+
+#[test]
+fn mock_vehicles_leave_nothing_behind_on_a_broker_of_somebody_else() {
+    let Some(mosquitto) = Mosquitto::start() else { return };
+    let (crashed, foreign) = (
+        "uagv/v2/vda5050-tck/mock-7/connection",
+        "uagv/v2/ACME/mock-7/connection",
+    );
+    keeps(mosquitto.port, &[crashed, foreign]);
+    let bench = Bench::new();
+    let broker = format!("broker = \"{}\"\ntap = false", mosquitto.url());
+    let profile = commanded("").replace("listen = \"127.0.0.1:0\"", &broker);
+    std::fs::write(bench.path().join("device.toml"), profile).unwrap();
+    let run = ["run", "--profile", "device.toml", "dispatch/one-edge"];
+    bench
+        .run(&[&run[..], &["--plan"]].concat())
+        .code(0)
+        .prints("uagv/v2/vda5050-tck/mock-1/connection");
+    assert_eq!(kept(mosquitto.port), [foreign, crashed], "a plan touches nothing");
+    bench
+        .run(&run)
+        .code(0)
+        .says("cleared what an earlier run has left on the broker: uagv/v2/vda5050-tck/mock-7/connection");
+    assert_eq!(kept(mosquitto.port), [foreign]);
+}
+
 #[test]
 fn a_simulated_master_control_with_a_fault_does_not_conform() {
     let (bench, ended) = judged(r#""--fault", "edge-missing""#, &["dispatch/one-edge"]);

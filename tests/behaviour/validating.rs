@@ -224,3 +224,61 @@ fn one_message_that_is_too_large_is_refused_where_it_stands_and_the_others_are_j
         .code(2)
         .prints("FAIL the array is not closed");
 }
+
+#[test]
+fn own_suites_are_checked_with_their_own_requirements_actions_and_stimuli() {
+    let own = fixture("own");
+    let file = |name: &str| format!("{own}/{name}");
+    let files = [
+        file("requirements/SYS.yaml"),
+        file("agv/sys/blinks.yaml"),
+        file("agv/sys/keeps-the-number.yaml"),
+        file("explore/agv/sys.yaml"),
+    ];
+    let [requirements, blinks, keeps, explore] = files.each_ref().map(String::as_str);
+    let checked = run(&["validate", "--suites", &own, requirements, blinks, keeps, explore]).code(0);
+    for what in ["a file of 2 requirements", "a test", "a file of 1 stimuli"] {
+        assert!(checked.stdout.contains(what), "{}", checked.stdout);
+    }
+    run(&["validate", keeps]).code(2).prints("unknown requirement `SYS-12`");
+    // One that the vehicle does not have makes the test not applicable, and what is nearly a known one is a slip.
+    let planned = run(&["run", "--plan", "--suites", &own, "sys/*", "--format", "json"]).code(0);
+    let planned: Value = serde_json::from_str(&planned.stdout).unwrap();
+    let gates: Vec<&Value> = planned["tests"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|test| &test["gate"])
+        .collect();
+    assert_eq!(gates, ["not-applicable", "runs"]);
+    let folder = tempfile::tempdir().unwrap();
+    let slip = fs::read_to_string(blinks)
+        .unwrap()
+        .replace("action blink ", "action startPuase ");
+    fs::write(folder.path().join("slip.yaml"), slip).unwrap();
+    run_in(folder.path(), &["validate", "--suites", &own, "slip.yaml"])
+        .code(2)
+        .prints("did you mean `startPause`?");
+}
+
+#[test]
+fn mistakes_in_own_requirements_and_stimuli_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
+    };
+    let good = fs::read_to_string(fixture("own/requirements/SYS.yaml")).unwrap();
+    write("SYS.yaml", &good.replace("mood: shall", "mood: must"));
+    write(
+        "explore/agv/lost.yaml",
+        "blink: { title: It blinks, in: [nowhere], sends: \"\" }\n",
+    );
+    run_in(folder.path(), &["validate", "SYS.yaml"])
+        .code(2)
+        .prints("`must` is not known for `mood`");
+    run_in(folder.path(), &["validate", "explore/agv/lost.yaml"])
+        .code(2)
+        .prints("names the situation `nowhere`");
+}

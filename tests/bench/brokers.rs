@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use tokio::net::TcpStream;
 
 use vda5050_tck::bench::LinkError;
+use vda5050_tck::bench::endpoint::Access;
 use vda5050_tck::journal::event::{Event, LinkFault};
 use vda5050_tck::link::Link;
 use vda5050_tck::link::mqtt::{BenchOptions, BrokerChoice, MqttBench};
@@ -71,8 +72,7 @@ async fn mosquitto(extra: &str) -> Option<Mosquitto> {
 fn external(url: &str) -> BenchOptions {
     let broker = BrokerChoice::External {
         url: url.to_owned(),
-        authority: None,
-        credentials: None,
+        access: Access::default(),
     };
     BenchOptions {
         broker,

@@ -5,7 +5,7 @@ use std::time::Duration;
 use bytes::Bytes;
 
 use vda5050_tck::bench::Offer;
-use vda5050_tck::bench::endpoint::Endpoint;
+use vda5050_tck::bench::endpoint::{Access, Endpoint};
 use vda5050_tck::clock::Stamp;
 use vda5050_tck::journal::event::{Event, LinkFault, Packet};
 use vda5050_tck::link::Link;
@@ -89,7 +89,7 @@ impl Device for Answering {
 #[tokio::test]
 async fn a_reference_device_runs_over_tcp() {
     let mut rig = rig().await;
-    let endpoint = Endpoint::parse(&rig.info.device_address, None, None).unwrap();
+    let endpoint = Endpoint::parse(&rig.info.device_address, &Access::default()).unwrap();
     let options = BenchOptions::loopback(vec![]);
     let device = RunningDevice::start(Answering::default(), endpoint, options.clock, None);
     rig.until("online", |o| is_message(o, "online")).await;

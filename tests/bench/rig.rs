@@ -9,7 +9,7 @@ use tokio::sync::mpsc;
 
 use vda5050_tck::bench::Outgoing;
 use vda5050_tck::bench::client::{Client, ClientEvent, ClientOptions};
-use vda5050_tck::bench::endpoint::Endpoint;
+use vda5050_tck::bench::endpoint::{Access, Endpoint};
 use vda5050_tck::journal::event::{Close, Event, LinkFault, Occurrence, Packet};
 use vda5050_tck::link::Link;
 use vda5050_tck::link::mqtt::{BenchInfo, BenchOptions, MqttBench, MqttLink};
@@ -85,7 +85,7 @@ pub struct TestDevice {
 impl TestDevice {
     pub fn open(info: &BenchInfo, client_id: &str, keep_alive: u64) -> Self {
         let (client, events) = Client::open(&ClientOptions {
-            endpoint: Endpoint::parse(&info.device_address, None, None).unwrap(),
+            endpoint: Endpoint::parse(&info.device_address, &Access::default()).unwrap(),
             client_id: client_id.to_owned(),
             keep_alive: Duration::from_secs(keep_alive),
             clean_session: true,

@@ -10,7 +10,7 @@ use tokio::net::TcpStream;
 
 use vda5050_tck::bench::Offer;
 use vda5050_tck::bench::client::{Client, ClientEvent, ClientOptions};
-use vda5050_tck::bench::endpoint::Endpoint;
+use vda5050_tck::bench::endpoint::{Access, Endpoint};
 use vda5050_tck::bench::tls::TlsFiles;
 use vda5050_tck::journal::event::{Event, Source};
 use vda5050_tck::link::Link;
@@ -94,7 +94,11 @@ async fn the_device_side_can_be_tls() {
     })
     .await;
     let (_, port) = rig.info.device_address.rsplit_once(':').unwrap();
-    let endpoint = Endpoint::parse(&format!("mqtts://localhost:{port}"), Some(&certificate), None).unwrap();
+    let access = Access {
+        authority: Some(certificate),
+        ..Access::default()
+    };
+    let endpoint = Endpoint::parse(&format!("mqtts://localhost:{port}"), &access).unwrap();
     let (client, mut events) = Client::open(&ClientOptions {
         endpoint,
         client_id: "secure".to_owned(),

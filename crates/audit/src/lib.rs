@@ -71,7 +71,9 @@ impl Options {
         self.vehicles.is_empty() || self.vehicles.iter().any(named)
     }
 
-    fn wants_monitor(&self, monitor: &Monitor) -> bool {
+    /// Whether this monitor is to judge.
+    #[must_use]
+    pub fn wants_monitor(&self, monitor: &Monitor) -> bool {
         let fits = |wanted: &str, name: &str| match wanted.strip_suffix('*') {
             Some(begin) => name.starts_with(begin),
             None => name == wanted,

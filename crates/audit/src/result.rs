@@ -294,6 +294,54 @@ impl SideResult {
     }
 }
 
+impl AuditResult {
+    /// Takes in what was found of a vehicle beside the audit. Where the audit has found the same, that counts once more.
+    pub fn add(&mut self, (manufacturer, serial_number): (&str, &str), finding: FindingResult) {
+        let mut vehicles = self.vehicles.iter_mut().rev();
+        let vehicle =
+            vehicles.find(|vehicle| vehicle.manufacturer == manufacturer && vehicle.serial_number == serial_number);
+        let sides = vehicle.into_iter().flat_map(|vehicle| &mut vehicle.sides);
+        let Some(side) = sides.into_iter().find(|side| side.role == Role::Agv.word()) else {
+            return;
+        };
+        side.add(finding);
+        self.verdict = verdict_of(&self.vehicles);
+    }
+}
+
+impl SideResult {
+    fn add(&mut self, finding: FindingResult) {
+        let verdict = finding.verdict;
+        self.verdict = Some(self.verdict.map_or(verdict, |known| known.join(verdict)));
+        match self.requirements.iter_mut().find(|one| one.id == finding.requirement) {
+            Some(decided) => {
+                decided.verdict = decided.verdict.join(verdict);
+                if !decided.decided_by.contains(&finding.monitor) {
+                    decided.decided_by.push(finding.monitor.clone());
+                }
+            }
+            None => self.requirements.push(Decided {
+                id: finding.requirement.clone(),
+                verdict,
+                decided_by: vec![finding.monitor.clone()],
+            }),
+        }
+        let is_same = |known: &&mut FindingResult| {
+            (&known.monitor, &known.requirement, known.verdict) == (&finding.monitor, &finding.requirement, verdict)
+        };
+        match self.findings.iter_mut().find(is_same) {
+            Some(known) => {
+                known.count += finding.count;
+                known.last = finding.last;
+            }
+            None => {
+                let at = self.findings.partition_point(|known| known.verdict >= verdict);
+                self.findings.insert(at, finding);
+            }
+        }
+    }
+}
+
 /// The worst verdict of all sides.
 #[must_use]
 pub fn verdict_of(vehicles: &[VehicleResult]) -> Option<Verdict> {

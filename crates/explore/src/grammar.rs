@@ -178,6 +178,19 @@ impl Grammar {
         grammar.checked(&path)
     }
 
+    /// Checks a file of stimuli beside the head of a grammar and the stimuli that are there; how many it has.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn check_part(assets: &Assets, role: Role, path: &str, text: &str) -> Result<usize, GrammarError> {
+        let mut grammar = Self::load(assets, role)?;
+        let stimuli: BTreeMap<String, Stimulus> = parsed(path, text)?;
+        let count = stimuli.len();
+        grammar.stimuli = stimuli;
+        grammar.checked(path)?;
+        Ok(count)
+    }
+
     /// Reads a grammar that stands in one file.
     ///
     /// # Errors

@@ -18,6 +18,18 @@ use tck_base::verdict::Verdict;
 pub struct RequirementId(std::sync::Arc<str>);
 
 impl RequirementId {
+    /// Whether a text can be an id: a group, a hyphen and a number, such as `ORD-REJ-03`, `SYS-4711` or `SYS_REQ-7`.
+    #[must_use]
+    pub fn is_one(text: &str) -> bool {
+        text.rsplit_once('-').is_some_and(|(group, number)| {
+            let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
+            group.starts_with(|c: char| c.is_ascii_alphabetic())
+                && group.chars().all(is_plain)
+                && !number.is_empty()
+                && number.bytes().all(|digit| digit.is_ascii_digit())
+        })
+    }
+
     /// The id as text.
     #[must_use]
     pub fn as_str(&self) -> &str {
@@ -176,6 +188,9 @@ pub struct Requirement {
     pub needs: Vec<String>,
     /// The ruling where the text is silent or contradicts itself.
     pub interpretation: Option<String>,
+    /// Where it is tracked, for a requirement of somebody's own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub link: Option<String>,
 }
 
 impl Requirement {
@@ -234,6 +249,19 @@ impl Catalogue {
             Ok(catalogue)
         } else {
             Err(problems)
+        }
+    }
+
+    /// Checks the text of one file of requirements; how many it has.
+    ///
+    /// # Errors
+    /// Every mistake in it.
+    pub fn check_text(name: &str, text: &str) -> Result<usize, Vec<Diagnostic>> {
+        let mut problems = Vec::new();
+        let chapter = catalogue_file::read(&Source::new(name, text), &mut problems);
+        match chapter {
+            Some(chapter) if problems.is_empty() => Ok(chapter.requirements.len()),
+            _ => Err(problems),
         }
     }
 
@@ -355,6 +383,9 @@ mod tests {
         let ids: Vec<_> = catalogue.all().map(|requirement| requirement.id.as_str()).collect();
         assert_eq!(ids[..2], ["MQTT-01", "MQTT-02"]);
         assert!(ids[349].starts_with("BP-"));
+        // Those of the standard have two digits; those of somebody's own have what their tracker gives them.
+        let digits = |id: &str| id.rsplit('-').next().map(str::len);
+        assert!(ids.iter().all(|id| RequirementId::is_one(id) && digits(id) == Some(2)));
         let requirement = catalogue.get("ORD-REJ-03").expect("requirement");
         assert_eq!(
             (requirement.group.as_str(), requirement.chapter.as_str()),

@@ -47,7 +47,7 @@ struct Reader<'a> {
     problems: &'a mut Vec<Diagnostic>,
 }
 
-const KEYS: [&str; 10] = [
+const KEYS: [&str; 11] = [
     "id",
     "text",
     "role",
@@ -58,6 +58,7 @@ const KEYS: [&str; 10] = [
     "observe",
     "needs",
     "interpretation",
+    "link",
 ];
 
 impl Reader<'_> {
@@ -65,10 +66,11 @@ impl Reader<'_> {
         self.known(node, &KEYS);
         let place = self.member(node, "id")?;
         let id = self.text(node, "id")?;
-        let number = id.strip_prefix(group).and_then(|rest| rest.strip_prefix('-'));
-        if !number.is_some_and(|number| number.len() == 2 && number.bytes().all(|digit| digit.is_ascii_digit())) {
+        let is_of_group = id.strip_prefix(group).is_some_and(|rest| rest.starts_with('-'));
+        if !is_of_group || !RequirementId::is_one(&id) {
             let title = format!("`{id}` is no id of the group {group}");
-            self.problem(place, &title, "not of the form GROUP-NN", &format!("write {group}-NN"));
+            let hint = format!("write {group}-1 or {group}-4711");
+            self.problem(place, &title, "not the group, a hyphen and a number", &hint);
         }
         let needs = self
             .list(node, "needs")?
@@ -87,6 +89,7 @@ impl Reader<'_> {
             observe: self.text(node, "observe")?,
             needs,
             interpretation: node.get("interpretation").and_then(|text| self.as_text(text)),
+            link: node.get("link").and_then(|link| self.link(link)),
         };
         Some((place.span.clone(), requirement))
     }
@@ -152,11 +155,26 @@ impl Reader<'_> {
     fn as_text(&mut self, node: &Node) -> Option<String> {
         match node.text().map(str::trim) {
             Some(text) if !text.is_empty() => Some(text.to_owned()),
-            _ => {
+            Some(_) => {
+                let title = "an empty text where a text is due";
+                self.problem(node, title, "says nothing", "write a text, or take the key out");
+                None
+            }
+            None => {
                 self.wrong(node, "a text");
                 None
             }
         }
+    }
+
+    fn link(&mut self, node: &Node) -> Option<String> {
+        let link = self.as_text(node)?;
+        if link.starts_with("https://") || link.starts_with("http://") {
+            return Some(link);
+        }
+        let title = format!("`{link}` is no link");
+        self.problem(node, &title, "leads nowhere", "write https://…");
+        None
     }
 
     fn list<'n>(&mut self, node: &'n Node, key: &str) -> Option<&'n [Node]> {
@@ -245,6 +263,24 @@ requirements:
     }
 
     #[test]
+    fn ids_are_as_trackers_write_them() {
+        for (group, id) in [
+            ("SYS", "SYS-4711"),
+            ("AGV2-REQ", "AGV2-REQ-01"),
+            ("SYS_REQ", "SYS_REQ-7"),
+            ("agv", "agv-1"),
+        ] {
+            let text = GOOD.replace("A-B-01", id).replace("A-B", group);
+            assert_eq!(titles(&text), Vec::<String>::new(), "{id}");
+        }
+        let linked = GOOD.to_owned() + "    link: https://tracker.example/A-B-01\n";
+        let mut problems = Vec::new();
+        let chapter = read(&Source::new("x.yaml", linked), &mut problems).expect("chapter");
+        let (_, requirement) = &chapter.requirements[0];
+        assert_eq!(requirement.link.as_deref(), Some("https://tracker.example/A-B-01"));
+    }
+
+    #[test]
     fn every_mistake_is_named() {
         for (good, bad, expected) in [
             ("role: both", "role: agx", "`agx` is not known for `role`"),
@@ -252,7 +288,9 @@ requirements:
             ("decided: not-testable", "decided: active", "a reason without need"),
             ("text: Do it.", "text: 5", "a number where a text is due"),
             ("id: A-B-01", "id: A-C-01", "`A-C-01` is no id of the group A-B"),
-            ("id: A-B-01", "id: A-B-1", "`A-B-1` is no id of the group A-B"),
+            ("id: A-B-01", "id: A-B-1a", "`A-B-1a` is no id of the group A-B"),
+            ("id: A-B-01", "id: A-B-", "`A-B-` is no id of the group A-B"),
+            ("id: A-B-01", "id: A-B2-1", "`A-B2-1` is no id of the group A-B"),
             ("observe:", "observes:", "unknown key `observes`"),
             ("mood: may", "mood: must", "`must` is not known for `mood`"),
             ("needs: [layout]", "needs: layout", "a text where a list is due"),
@@ -261,6 +299,12 @@ requirements:
                 "in: {}",
                 "in no version",
             ),
+            (
+                "interpretation: Free.",
+                "interpretation: \"\"",
+                "an empty text where a text is due",
+            ),
+            ("interpretation: Free.", "link: tracker", "`tracker` is no link"),
             ("position: 3", "position: first", "a text where a whole number is due"),
         ] {
             let text = GOOD.replace(good, bad);

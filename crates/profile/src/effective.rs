@@ -199,6 +199,8 @@ impl Taken<'_> {
                 tls_cert: self.path("bench.tls-cert"),
                 tls_key: self.path("bench.tls-key"),
                 tls_ca: self.path("bench.tls-ca"),
+                client_cert: self.path("bench.client-cert"),
+                client_key: self.path("bench.client-key"),
                 username: self.text("bench.username"),
                 password,
             },
@@ -316,7 +318,11 @@ impl Taken<'_> {
                     .hint("keep one of them"),
             );
         }
-        for (one, other) in [("bench.tls-cert", "bench.tls-key"), ("bench.tls-key", "bench.tls-cert")] {
+        let pairs = [
+            ("bench.tls-cert", "bench.tls-key"),
+            ("bench.client-cert", "bench.client-key"),
+        ];
+        for (one, other) in pairs.into_iter().flat_map(|(one, other)| [(one, other), (other, one)]) {
             if has(one) && !has(other) {
                 let title = format!("`{one}` needs `{other}`");
                 wrong.push(self.at(one, title, "half of a pair"));

@@ -352,6 +352,8 @@ pub const KEYS: &[Key] = &[
     key("bench.tls-cert", Kind::File),
     key("bench.tls-key", Kind::File),
     key("bench.tls-ca", Kind::File),
+    key("bench.client-cert", Kind::File),
+    key("bench.client-key", Kind::File),
     key("bench.username", Kind::Text),
     key("bench.password-env", Kind::Text),
     key("bench.password-file", Kind::File),

@@ -225,6 +225,10 @@ pub struct Bench {
     pub tls_key: Option<PathBuf>,
     /// Whom to trust at the broker (PEM).
     pub tls_ca: Option<PathBuf>,
+    /// Certificate the harness shows a broker that asks for one (PEM).
+    pub client_cert: Option<PathBuf>,
+    /// Its key (PEM).
+    pub client_key: Option<PathBuf>,
     /// User name at the broker.
     pub username: Option<String>,
     /// Where the password is.

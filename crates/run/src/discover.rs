@@ -210,9 +210,10 @@ pub async fn listen(
     packs: &Packs,
     mut interrupt: tokio::sync::watch::Receiver<bool>,
 ) -> Result<Heard, String> {
+    let made_up = || format!("tck-discover-{}", &uuid::Uuid::new_v4().simple().to_string()[..8]);
     let options = ClientOptions {
+        client_id: endpoint.client_id.clone().unwrap_or_else(made_up),
         endpoint,
-        client_id: format!("tck-discover-{}", &uuid::Uuid::new_v4().simple().to_string()[..8]),
         keep_alive: Duration::from_secs(30),
         clean_session: true,
         will: None,

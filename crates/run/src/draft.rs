@@ -18,6 +18,8 @@ pub struct Wishes {
     pub username: Option<String>,
     /// Whose certificates are trusted there, as a PEM file.
     pub tls_ca: Option<String>,
+    /// What is shown to a broker that asks for a certificate, as PEM files: the certificate and its key.
+    pub identity: Option<(String, String)>,
     /// A LIF file of the floor.
     pub lif: Option<String>,
     /// The vehicle type in it.
@@ -110,6 +112,14 @@ fn bench(wishes: &Wishes, text: &mut String) {
             let _ = writeln!(text, "tls-ca = {}", quoted(file));
         }
         None => text.push_str("# tls-ca = \"ca.crt\"\n"),
+    }
+    if let Some((certificate, key)) = &wishes.identity {
+        let _ = writeln!(
+            text,
+            "client-cert = {}\nclient-key = {}",
+            quoted(certificate),
+            quoted(key)
+        );
     }
 }
 

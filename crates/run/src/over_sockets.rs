@@ -28,12 +28,14 @@ use tck_journal::{Journal, Reason, Vantage};
 use tck_judge::Library;
 use tck_judge::RunJudge;
 use tck_net::bench::LinkError;
-use tck_net::bench::endpoint::Endpoint;
-use tck_net::link::mqtt::{BenchInfo, BenchOptions, MqttBench, MqttLink};
+use tck_net::bench::endpoint::{Access, Endpoint};
+use tck_net::bench::leavings::clear;
+use tck_net::bench::own::OwnNames;
+use tck_net::link::mqtt::{BenchInfo, BenchOptions, BrokerChoice, MqttBench, MqttLink};
 use tck_pack::Pack;
 use tck_profile::{Effective, Profile, Secrets, Surroundings};
-use tck_simulate::WithFleet;
 use tck_simulate::{BuiltIn, UnknownName};
+use tck_simulate::{Leavings, WithFleet};
 
 /// A run over real sockets.
 pub struct SocketRun {
@@ -209,6 +211,10 @@ impl SocketRun {
             limits: Vec::new(),
             maps: self.maps,
         };
+        let retained = match (&self.device.fleet, &self.options.broker) {
+            (Some(fleet), BrokerChoice::External { .. }) => fleet.retained(pack),
+            _ => Vec::new(),
+        };
         let subject = self.device.subject.clone();
         let time = Value::Object(self.device.time.bindings());
         let (_, mut setup) = self.device.on(bench, self.request, library, pack);
@@ -217,7 +223,10 @@ impl SocketRun {
             statements.insert("active-map".to_owned(), true);
             setup.capabilities.factsheet = factsheet;
         }
-        RunPlan::of(&subject, pack, &time, setup, &hooks)
+        RunPlan {
+            retained,
+            ..RunPlan::of(&subject, pack, &time, setup, &hooks)
+        }
     }
 
     /// The same on this thread until it is over, with nobody watching and without a bundle.
@@ -255,6 +264,16 @@ impl SocketRun {
         } else {
             Vantage::Subscriber
         };
+        let rests = Rests::of(&self.device, &self.options, pack)?;
+        if let Some(rests) = &rests {
+            let cleared = rests.clear().await?;
+            if !cleared.is_empty() {
+                progress.note(&format!(
+                    "cleared what an earlier run has left on the broker: {}",
+                    cleared.join(", ")
+                ));
+            }
+        }
         let (link, info) = MqttBench::start(self.options).await?;
         let stage = Stage {
             library,
@@ -268,11 +287,12 @@ impl SocketRun {
             clock,
             earlier: self.earlier,
             quit: self.quit,
+            rests,
         };
         match self.source {
             Source::BuiltIn { device, faults } => {
                 let faults: Vec<&str> = faults.iter().map(String::as_str).collect();
-                let endpoint = Endpoint::parse(&info.device_address, None, None)?;
+                let endpoint = Endpoint::parse(&info.device_address, &Access::default())?;
                 let operator = Commands {
                     device: device.start(&faults, endpoint, clock)?,
                     hooks: device.hooks(),
@@ -331,6 +351,34 @@ struct Stage<'a> {
     clock: WallClock,
     earlier: Option<Journal>,
     quit: Option<tokio::sync::watch::Receiver<bool>>,
+    rests: Option<Rests>,
+}
+
+/// What mock vehicles would leave behind on a broker of somebody else.
+struct Rests {
+    broker: Endpoint,
+    own: OwnNames,
+    leavings: Leavings,
+}
+
+impl Rests {
+    /// `None` where nothing stays behind: vehicles of others are their own business, and the embedded broker goes with the run.
+    fn of(device: &DeviceUnderTest, options: &BenchOptions, pack: &Pack) -> Result<Option<Self>, LinkError> {
+        let (Some(fleet), BrokerChoice::External { url, access }) = (&device.fleet, &options.broker) else {
+            return Ok(None);
+        };
+        Ok(Some(Self {
+            broker: Endpoint::parse(url, access)?,
+            own: options.own.clone(),
+            leavings: fleet.leavings(pack),
+        }))
+    }
+
+    /// Clears it, and names the topics.
+    async fn clear(&self) -> Result<Vec<String>, LinkError> {
+        let is_own = |topic: &str| self.leavings.is_own(topic);
+        clear(&self.broker, self.own.client("clears"), self.leavings.filters(), is_own).await
+    }
 }
 
 impl Stage<'_> {
@@ -381,6 +429,13 @@ impl Stage<'_> {
         } = engine;
         operator.end().await;
         operator.stop().await;
+        if let Some(rests) = &self.rests
+            && let Err(error) = rests.clear().await
+        {
+            progress.note(&format!(
+                "retained messages of the mock vehicles may have stayed on the broker: {error}; the next run clears them"
+            ));
+        }
         link.stop().await;
         Ok(Finished {
             result: recorder.judge().result(),

@@ -111,6 +111,9 @@ pub struct RunPlan {
     /// Why the vehicle does not move; absent when it may.
     #[serde(skip_serializing_if = "Option::is_none", serialize_with = "as_sentence")]
     pub stands_still: Option<Reason>,
+    /// The topics on which mock vehicles keep a message on a broker of somebody else, and which are cleared at the end.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub retained: Vec<String>,
 }
 
 impl RunPlan {
@@ -162,6 +165,7 @@ impl RunPlan {
             metres: (edges as f64 * mean_edge(setup.layout.as_ref())).round(),
             stands_still: setup.capabilities.motion.err(),
             tests: lines,
+            retained: Vec::new(),
         }
     }
 

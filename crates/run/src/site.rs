@@ -1,10 +1,11 @@
 //! The bench of a site, as a profile describes it: broker, certificates, secrets, and who can reach what.
 
 use std::net::IpAddr;
+use std::path::PathBuf;
 
 use tck_base::diagnostic::Diagnostic;
 use tck_journal::Reason;
-use tck_net::bench::endpoint::Credentials;
+use tck_net::bench::endpoint::{Access, Credentials};
 use tck_net::bench::own::OwnNames;
 use tck_net::bench::tls::TlsFiles;
 use tck_net::link::mqtt::{BenchOptions, BrokerChoice};
@@ -17,6 +18,8 @@ pub(super) fn certificates(effective: &Effective) -> Result<(), Vec<Diagnostic>>
         ("bench.tls-ca", &bench.tls_ca),
         ("bench.tls-cert", &bench.tls_cert),
         ("bench.tls-key", &bench.tls_key),
+        ("bench.client-cert", &bench.client_cert),
+        ("bench.client-key", &bench.client_key),
     ];
     let unreadable = files.into_iter().filter_map(|(setting, file)| {
         let file = file.as_ref()?;
@@ -49,7 +52,10 @@ pub(super) fn resolve(
         secrets.extend(hook.action.secrets());
     }
     if let BrokerChoice::External {
-        credentials: Some(credentials),
+        access: Access {
+            credentials: Some(credentials),
+            ..
+        },
         ..
     } = &options.broker
     {
@@ -66,6 +72,14 @@ pub(super) fn resolve(
 pub(super) struct Topics {
     pub(super) device: Vec<String>,
     pub(super) harness: Vec<String>,
+}
+
+/// A certificate with its key.
+fn shown(certificate: Option<&PathBuf>, key: Option<&PathBuf>) -> Option<TlsFiles> {
+    Some(TlsFiles {
+        certificate: certificate?.clone(),
+        key: key?.clone(),
+    })
 }
 
 /// The bench that a profile describes.
@@ -89,19 +103,17 @@ pub(super) fn bench_of(
             None => BrokerChoice::Embedded,
             Some(url) => BrokerChoice::External {
                 url: url.clone(),
-                authority: bench.tls_ca.clone(),
-                credentials,
+                access: Access {
+                    authority: bench.tls_ca.clone(),
+                    identity: shown(bench.client_cert.as_ref(), bench.client_key.as_ref()),
+                    credentials,
+                    client_id: None,
+                },
             },
         },
         authority: bench.tls_ca.clone(),
         tap: bench.tap,
-        tls: match (&bench.tls_cert, &bench.tls_key) {
-            (Some(certificate), Some(key)) => Some(TlsFiles {
-                certificate: certificate.clone(),
-                key: key.clone(),
-            }),
-            _ => None,
-        },
+        tls: shown(bench.tls_cert.as_ref(), bench.tls_key.as_ref()),
         maps_listen: bench.maps_listen.clone(),
         maps_host: bench.maps_host.clone(),
         own: OwnNames {
@@ -189,8 +201,7 @@ mod tests {
         bench.tap = false;
         bench.broker = BrokerChoice::External {
             url: "mqtt://192.168.1.10:1883".to_owned(),
-            authority: None,
-            credentials: None,
+            access: Access::default(),
         };
         assert!(reach(&bench, false).is_err());
     }

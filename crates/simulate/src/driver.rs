@@ -250,12 +250,12 @@ impl<D: Device> Driver<D> {
 
     fn connect(&mut self) {
         let options = self.device.connect_options(self.clock.now());
-        self.client_id.clone_from(&options.client_id);
+        self.client_id = self.endpoint.client_id.clone().unwrap_or(options.client_id);
         self.will = options.will.map(outgoing);
         self.established = false;
         self.connection = Some(Client::open(&ClientOptions {
             endpoint: self.endpoint.clone(),
-            client_id: options.client_id,
+            client_id: self.client_id.clone(),
             keep_alive: options.keep_alive,
             clean_session: options.clean_session,
             will: self.will.clone(),

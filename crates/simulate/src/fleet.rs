@@ -1,5 +1,6 @@
 //! The mock AGVs that a master control is tested with: reference AGVs with identities and places of their own.
 
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use serde_json::{Value, json};
@@ -11,6 +12,9 @@ use tck_pack::{Pack, Role};
 
 /// How many mock AGVs there are unless more are asked for: the one that tests talk about, and one beside it.
 pub const USUAL_FLEET: usize = 2;
+
+/// How the serial number of a mock AGV begins that nobody has named; its number follows.
+const MADE_UP: &str = "mock-";
 
 /// The mock AGVs of a run.
 #[derive(Clone, Debug)]
@@ -36,7 +40,7 @@ impl Fleet {
             let serial = serials
                 .get(number)
                 .cloned()
-                .unwrap_or_else(|| format!("mock-{}", number + 1));
+                .unwrap_or_else(|| format!("{MADE_UP}{}", number + 1));
             vehicle.rename(manufacturer, &serial, template.as_deref(), pack);
             // The first two stand far from each other, so that neither is in the way.
             let place = match number {
@@ -115,9 +119,88 @@ impl Fleet {
         all.flat_map(|vehicle| vehicle.subject.published(pack)).collect()
     }
 
+    /// The topics on which these vehicles leave retained messages.
+    #[must_use]
+    pub fn retained(&self, pack: &Pack) -> Vec<String> {
+        let kept = pack.topics().iter().filter(|rule| rule.retain);
+        let kept: Vec<&str> = kept.map(|rule| rule.name.as_str()).collect();
+        let all = self.vehicles.iter().flat_map(|vehicle| {
+            let mut topics = vehicle.subject.topics(pack);
+            kept.iter().filter_map(move |name| topics.remove(*name))
+        });
+        all.collect()
+    }
+
+    /// Where vehicles of the harness may have left retained messages: these, and those of a run that had more of them and never
+    /// came to its end.
+    #[must_use]
+    pub fn leavings(&self, pack: &Pack) -> Leavings {
+        let any = self.vehicles.iter().map(|vehicle| Participant {
+            serial_number: "+".to_owned(),
+            ..vehicle.subject.clone()
+        });
+        let made_up: BTreeSet<String> = any.flat_map(|any| any.published(pack)).collect();
+        Leavings {
+            own: self.published(pack),
+            filters: made_up.into_iter().collect(),
+        }
+    }
+
     /// How to put a vehicle back where it is at the start of a test.
     #[must_use]
     pub fn reset(node: Option<&str>) -> Value {
         node.map_or_else(|| json!({}), |node| json!({ "nodeId": node }))
+    }
+}
+
+/// Topics on which vehicles of the harness leave something behind.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Leavings {
+    own: Vec<String>,
+    /// The same with `+` for the serial number.
+    filters: Vec<String>,
+}
+
+impl Leavings {
+    /// What to subscribe to, to see all of it.
+    #[must_use]
+    pub fn filters(&self) -> Vec<String> {
+        self.filters.clone()
+    }
+
+    /// Whether a vehicle of the harness has left what is retained there: one of these, or one whose name is made up.
+    #[must_use]
+    pub fn is_own(&self, topic: &str) -> bool {
+        let is_made_up = |filter: &String| {
+            let (before, after) = filter.split_once('+')?;
+            let serial = topic.strip_prefix(before)?.strip_suffix(after)?;
+            let number = serial.strip_prefix(MADE_UP)?;
+            Some(!number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit()))
+        };
+        self.own.iter().any(|own| own == topic) || self.filters.iter().any(|filter| is_made_up(filter) == Some(true))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_vehicles_of_the_harness_leave_something_behind() {
+        let library = tck_testing::library();
+        let pack = library.rules.packs.latest();
+        let fleet = Fleet::new(&ReferenceAgv::new(pack), "ACME", &["A-1".to_owned()], 2, pack);
+        let leavings = fleet.leavings(pack);
+        let of = |serial: &str, name: &str| pack.fill_topic(pack.topic_template(), "ACME", serial, name);
+        for serial in ["A-1", "mock-2", "mock-17"] {
+            assert!(leavings.is_own(&of(serial, "connection")), "{serial}");
+        }
+        for serial in ["A-2", "mock-", "mock-x", "mock-2/mock-3", "x-mock-2"] {
+            assert!(!leavings.is_own(&of(serial, "connection")), "{serial}");
+        }
+        assert!(leavings.filters().contains(&of("+", "factsheet")));
+        let retained = fleet.retained(pack);
+        assert!(retained.contains(&of("A-1", "connection")) && retained.contains(&of("mock-2", "factsheet")));
+        assert!(!retained.contains(&of("A-1", "state")), "{retained:?}");
     }
 }

@@ -12,6 +12,9 @@ use tck_net::bench::endpoint::Endpoint;
 use tck_net::link::mqtt::Reporter;
 use tck_reference::deviations::personas::mock;
 
+/// How long a vehicle may take to sign off.
+const GOODBYE_LIMIT: Duration = Duration::from_secs(2);
+
 /// Hooks, and the mock AGVs of the harness; none when an AGV is tested.
 pub struct WithFleet<O> {
     operator: O,
@@ -37,10 +40,15 @@ impl<O> WithFleet<O> {
         Self { operator, vehicles }
     }
 
-    /// Signs the vehicles off; gives the hooks back.
+    /// Signs the vehicles off, with the last word of a vehicle that goes; gives the hooks back.
     pub async fn stop(self) -> O {
         for vehicle in self.vehicles {
-            vehicle.stop().await;
+            let said = tokio::time::timeout(GOODBYE_LIMIT, vehicle.command("shutdown", Value::Null)).await;
+            match said {
+                Ok(_) => vehicle.stop().await,
+                // Nobody takes what it reports any more.
+                Err(_) => vehicle.kill().await,
+            }
         }
         self.operator
     }

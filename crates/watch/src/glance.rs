@@ -7,10 +7,13 @@ use bytes::Bytes;
 use serde_json::Value;
 
 use super::Notice;
-use tck_audit::Address;
+use super::alarm::{Alarm, Alarmed, Alarms, cut};
+use tck_audit::result::FindingResult;
+use tck_audit::{Address, Found};
 use tck_base::clock::{Moment, Stamp};
 use tck_base::pattern::whole;
 use tck_base::verdict::Verdict;
+use tck_pack::Role;
 
 /// Upper ends of the buckets of reaction times, in seconds.
 pub const BUCKETS: [f64; 9] = [0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0];
@@ -20,8 +23,12 @@ const WAITING: usize = 32;
 const KINDS: usize = 256;
 /// The largest message that is kept beside a finding.
 const LARGEST: usize = 16 << 10;
-/// How long a text of a message may be that is shown.
-const TEXT: usize = 64;
+/// The monitor that judges a silence when it is over.
+pub(crate) const PERIOD: &str = "state/period";
+/// Its requirement.
+const SILENCE: &str = "STATE-02";
+/// What finds it before.
+const WATCH: &str = "watch/silence";
 
 /// How long a vehicle takes until a state shows a command.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -68,6 +75,25 @@ pub struct Kind {
     pub message: Option<(String, Bytes)>,
 }
 
+impl Kind {
+    /// As the result of an audit has it; no message shows it.
+    pub(crate) fn as_result(&self) -> FindingResult {
+        FindingResult {
+            monitor: self.monitor.clone(),
+            requirement: self.requirement.clone(),
+            verdict: self.verdict,
+            count: 1,
+            message: 0,
+            recording: None,
+            line: None,
+            first: self.last.clone(),
+            last: self.last.clone(),
+            text: self.text.clone(),
+            interpretation: None,
+        }
+    }
+}
+
 /// A command that no state shows yet.
 #[derive(Clone, Debug)]
 enum Command {
@@ -112,6 +138,7 @@ pub struct Glance {
     pub reactions: BTreeMap<&'static str, Reactions>,
     /// What was found, by kind.
     pub kinds: BTreeMap<(String, String, String, Verdict), Kind>,
+    pub(crate) alarms: Alarms,
     waiting: VecDeque<(Moment, Command)>,
 }
 
@@ -137,16 +164,18 @@ impl Glance {
             messages: BTreeMap::new(),
             reactions: BTreeMap::new(),
             kinds: BTreeMap::new(),
+            alarms: Alarms::default(),
             waiting: VecDeque::new(),
         }
     }
 
-    /// Takes in a message of its topic of this name; `stored` ones tell of the past.
-    pub fn take(&mut self, name: &str, at: Stamp, stored: bool, payload: &Bytes) {
+    /// Takes in a message of its topic of this name; `stored` ones tell of the past. Gives what somebody has to be told.
+    pub fn take(&mut self, name: &str, at: Stamp, stored: bool, payload: &Bytes) -> Vec<Alarm> {
         *self.messages.entry(name.to_owned()).or_default() += 1;
         self.heard = Some(at);
+        let mut alarms = Vec::new();
         let Ok(message) = serde_json::from_slice::<Value>(payload) else {
-            return;
+            return alarms;
         };
         match name {
             "order" if !stored => {
@@ -162,11 +191,15 @@ impl Glance {
                 let ids = elements(list).filter_map(|action| text(action, "actionId"));
                 self.wait(at.moment, Command::Actions(ids.collect()));
             }
-            "connection" => self.connection = short(&message, "connectionState"),
+            "connection" => {
+                self.connection = short(&message, "connectionState");
+                alarms.extend(self.alarms.connection(self.connection.as_deref(), at, stored));
+            }
             "state" => {
                 self.state(&message, payload);
                 if !stored {
                     self.shown(&message, at.moment);
+                    alarms = self.alarms.state(&message, at);
                 }
             }
             _ => {}
@@ -174,6 +207,49 @@ impl Glance {
         if !matches!(name, "order" | "instantActions") {
             self.version = short(&message, "version").or(self.version.take());
         }
+        alarms
+    }
+
+    /// The last state that came live: a vehicle that is only spoken to, or of which a broker has kept something, is not heard.
+    #[must_use]
+    pub fn last_state(&self) -> Option<Stamp> {
+        self.alarms.last_state()
+    }
+
+    /// Whether its connection topic says ONLINE, and no state comes.
+    #[must_use]
+    pub fn is_silent(&self) -> bool {
+        self.alarms.is_silent()
+    }
+
+    /// The finding that it has fallen silent: a warning, because it may have been cut off and its broker has not noticed yet.
+    /// The next state shows it, and the monitor judges it then. None when no state ever came, since a broker may keep them to
+    /// itself.
+    pub(crate) fn silence(&mut self, at: jiff::Timestamp, silent: Duration) -> Option<Found> {
+        self.alarms.last_state()?;
+        let before = self.silences().map_or(0, |kind| kind.count);
+        let found = Found {
+            manufacturer: self.manufacturer.clone(),
+            serial_number: self.serial_number.clone(),
+            role: Role::Agv.word().to_owned(),
+            monitor: WATCH.to_owned(),
+            requirement: SILENCE.to_owned(),
+            verdict: Verdict::Warning,
+            count: before + 1,
+            before,
+            message: 0,
+            at: format!("{at:.3}"),
+            text: format!(
+                "no state for {:.1} s so far, and its connection topic says ONLINE",
+                silent.as_secs_f64()
+            ),
+            interpretation: None,
+        };
+        self.note(&Notice {
+            found: found.clone(),
+            message: None,
+        });
+        Some(found)
     }
 
     /// Keeps a finding.
@@ -188,6 +264,10 @@ impl Glance {
             found.requirement.clone(),
             found.verdict,
         );
+        if found.monitor == PERIOD && found.verdict == Verdict::Fail {
+            // What was a silence without an end is this one.
+            self.kinds.retain(|_, kind| kind.monitor != WATCH);
+        }
         if !self.kinds.contains_key(&key) && self.kinds.len() >= KINDS {
             return;
         }
@@ -209,6 +289,21 @@ impl Glance {
         // A copy, so that the rest of what came with it is not kept as well.
         let copied = |(topic, payload): &(String, Bytes)| (topic.clone(), Bytes::copy_from_slice(payload));
         kind.message = notice.message.as_ref().filter(is_small).map(copied);
+    }
+
+    /// The silences that no state has ended.
+    pub(crate) fn silences(&self) -> Option<&Kind> {
+        self.kinds.values().find(|kind| kind.monitor == WATCH)
+    }
+
+    /// An alarm of this vehicle.
+    pub(crate) fn alarmed(&self, at: jiff::Timestamp, alarm: Alarm) -> Alarmed {
+        Alarmed {
+            manufacturer: self.manufacturer.clone(),
+            serial_number: self.serial_number.clone(),
+            at,
+            alarm,
+        }
     }
 
     /// How many kinds of this verdict were found.
@@ -286,8 +381,4 @@ fn text(message: &Value, member: &str) -> Option<String> {
 
 fn short(message: &Value, member: &str) -> Option<String> {
     text(message, member).map(|text| cut(&text))
-}
-
-fn cut(text: &str) -> String {
-    text.chars().take(TEXT).collect()
 }

@@ -1,12 +1,13 @@
 //! Live traffic, judged by the monitors as recorded traffic is.
 //!
 //! [`Watch`] is shown message after message and tells each finding with the message that shows it. [`glance`] keeps what
-//! is worth knowing of every vehicle at present, [`metrics`] writes it for a scraper, [`recorder`] keeps a journal that an
+//! is worth knowing of every vehicle at present, [`alarm`] is what somebody is told at once, [`metrics`] writes it for a scraper, [`recorder`] keeps a journal that an
 //! audit judges alike, and [`listener`] stays connected to a broker. [`session`] brings them together. What is kept is
 //! bounded, so a watch may go on for weeks.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+pub mod alarm;
 pub mod glance;
 mod listener;
 mod metrics;
@@ -18,10 +19,12 @@ use std::collections::{BTreeMap, VecDeque};
 
 use bytes::Bytes;
 
-use glance::Glance;
+use alarm::{Alarm, Alarmed};
+use glance::{Glance, Kind, PERIOD};
 use tck_audit::result::AuditResult;
 use tck_audit::{Audit, AuditError, Found, Options};
-use tck_base::clock::Stamp;
+use tck_base::clock::{Moment, Stamp};
+use tck_base::verdict::Verdict;
 use tck_capture::{Message, Wire};
 use tck_judge::Rules;
 
@@ -85,6 +88,9 @@ pub struct Watch<'r> {
     /// By manufacturer and serial number: which of them it is.
     names: BTreeMap<(String, String), String>,
     elsewhere: u64,
+    alarms: Vec<Alarmed>,
+    /// Whether silence is a finding.
+    judges_silence: bool,
 }
 
 impl<'r> Watch<'r> {
@@ -93,7 +99,10 @@ impl<'r> Watch<'r> {
     /// # Errors
     /// What is wrong with the options.
     pub fn new(rules: &'r Rules, options: Options) -> Result<Self, AuditError> {
+        let mut monitors = rules.suites.monitors.iter();
         Ok(Self {
+            judges_silence: monitors.any(|monitor| monitor.id == PERIOD && options.wants_monitor(monitor)),
+            alarms: Vec::new(),
             audit: Audit::new(rules, options)?.live(),
             recent: Recent::default(),
             glances: BTreeMap::new(),
@@ -117,7 +126,9 @@ impl<'r> Watch<'r> {
                         .entry(address.vehicle.clone())
                         .or_insert_with(|| Glance::new(&address));
                     let stored = message.retain == Some(true);
-                    glance.take(&address.name, at, stored, &message.payload);
+                    let alarms = glance.take(&address.name, at, stored, &message.payload);
+                    self.alarms
+                        .extend(alarms.into_iter().map(|alarm| glance.alarmed(at.utc, alarm)));
                 }
             }
             None => self.elsewhere += 1,
@@ -151,6 +162,48 @@ impl<'r> Watch<'r> {
         notices
     }
 
+    /// Time goes by: tells who has fallen silent by now.
+    pub fn pass(&mut self, now: Stamp) -> Vec<Notice> {
+        let mut notices = Vec::new();
+        for glance in self.glances.values_mut() {
+            let Some(alarm) = glance.alarms.pass(now.moment) else {
+                continue;
+            };
+            if let Alarm::Silent(silent) = alarm
+                && self.judges_silence
+                && let Some(found) = glance.silence(now.utc, silent)
+            {
+                notices.push(Notice { found, message: None });
+            }
+            self.alarms.push(glance.alarmed(now.utc, alarm));
+        }
+        notices
+    }
+
+    /// Nothing could be seen until now: nobody has fallen silent meanwhile.
+    pub fn unseen(&mut self, now: Moment) {
+        for glance in self.glances.values_mut() {
+            glance.alarms.unseen(now);
+        }
+    }
+
+    /// What somebody has to be told since this was asked last.
+    pub fn alarms(&mut self) -> Vec<Alarmed> {
+        std::mem::take(&mut self.alarms)
+    }
+
+    /// The vehicles with the worst findings first, by name where they are alike.
+    #[must_use]
+    pub fn worst_first(&self) -> Vec<&Glance> {
+        let mut all: Vec<&Glance> = self.glances.values().collect();
+        all.sort_by_cached_key(|glance| {
+            let kinds = |verdict| std::cmp::Reverse(glance.found(verdict));
+            let name = (glance.manufacturer.clone(), glance.serial_number.clone());
+            (kinds(Verdict::Fail), kinds(Verdict::Warning), name)
+        });
+        all
+    }
+
     /// The vehicles that were heard.
     pub fn glances(&self) -> impl ExactSizeIterator<Item = &Glance> {
         self.glances.values()
@@ -165,7 +218,14 @@ impl<'r> Watch<'r> {
     /// What came out of all.
     #[must_use]
     pub fn finish(self) -> AuditResult {
-        self.audit.finish(Vec::new())
+        let silent = self.glances.values().filter(|glance| glance.is_silent());
+        let found: Vec<(&Glance, &Kind)> = silent.filter_map(|glance| Some((glance, glance.silences()?))).collect();
+        let mut result = self.audit.finish(Vec::new());
+        for (glance, kind) in found {
+            // What is still going on no message has shown yet.
+            result.add((&glance.manufacturer, &glance.serial_number), kind.as_result());
+        }
+        result
     }
 }
 

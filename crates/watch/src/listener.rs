@@ -23,11 +23,11 @@ pub(super) struct Listener {
 impl Listener {
     /// Begins to connect as soon as it is asked for what comes.
     pub fn new(endpoint: Endpoint, filters: &[String]) -> Self {
-        let id = uuid::Uuid::new_v4().simple().to_string();
+        let made_up = || format!("tck-watch-{}", &uuid::Uuid::new_v4().simple().to_string()[..8]);
         Self {
             options: ClientOptions {
+                client_id: endpoint.client_id.clone().unwrap_or_else(made_up),
                 endpoint,
-                client_id: format!("tck-watch-{}", &id[..8]),
                 keep_alive: KEEP_ALIVE,
                 clean_session: true,
                 will: None,

@@ -110,6 +110,29 @@ pub(super) fn page(watch: &Watch<'_>, contact: Contact) -> String {
         }
     }
     page.family(
+        "vda5050_last_state_timestamp_seconds",
+        "gauge",
+        "When the last state of the vehicle came live: neither what is said to it nor what a broker has kept.",
+    );
+    for glance in &vehicles {
+        if let Some(state) = glance.last_state() {
+            let seconds = state.utc.as_microsecond() as f64 / 1e6;
+            page.sample(
+                "vda5050_last_state_timestamp_seconds",
+                &named(glance),
+                format!("{seconds:.3}"),
+            );
+        }
+    }
+    page.family(
+        "vda5050_vehicle_silent",
+        "gauge",
+        "Whether the connection topic of the vehicle says ONLINE, and no state comes.",
+    );
+    for glance in &vehicles {
+        page.sample("vda5050_vehicle_silent", &named(glance), u8::from(glance.is_silent()));
+    }
+    page.family(
         "vda5050_vehicle_online",
         "gauge",
         "Whether the connection topic of the vehicle says ONLINE.",

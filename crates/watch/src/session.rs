@@ -6,6 +6,7 @@ use std::time::Duration;
 use tokio::sync::watch;
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until};
 
+use super::alarm::Alarmed;
 use super::listener::Listener;
 use super::metrics;
 pub use super::metrics::Contact;
@@ -69,6 +70,8 @@ pub trait Viewer {
     fn found(&mut self, notice: &Notice);
     /// Something happened to the watch itself.
     fn happened(&mut self, happening: &Happening, at: jiff::Timestamp);
+    /// Something happened to a vehicle that somebody has to be told at once.
+    fn alarmed(&mut self, alarmed: &Alarmed);
     /// How things are; called from time to time. `false` ends the watch.
     fn tick(&mut self, watch: &Watch<'_>, contact: Contact) -> bool;
 }
@@ -143,6 +146,13 @@ pub async fn run(
             _ = interrupt.changed() => break,
             () = over => break,
             _ = ticks.tick() => {
+                if gone.is_none() {
+                    let notices = watch.pass(clock.now());
+                    tell(viewer, &mut watch);
+                    if shown(viewer, &notices) && settings.fail_fast {
+                        break;
+                    }
+                }
                 if !viewer.tick(&watch, seen(contact, gone, clock.now().moment)) {
                     break;
                 }
@@ -168,6 +178,7 @@ pub async fn run(
                 if let Some(message) = message {
                     notices.extend(watch.take(at, message));
                 }
+                tell(viewer, &mut watch);
                 if shown(viewer, &notices) && settings.fail_fast {
                     break;
                 }
@@ -181,6 +192,7 @@ pub async fn run(
                         Some(since) => {
                             let unseen = now.moment.since(since);
                             contact.unseen += unseen.as_secs_f64();
+                            watch.unseen(now.moment);
                             Happening::Again(unseen)
                         }
                         None => Happening::Connected,
@@ -218,6 +230,7 @@ pub async fn run(
                         carried: tap.is_some().then_some(Carried::BESIDE_TAP),
                     };
                     let notices = watch.take(now, message);
+                    tell(viewer, &mut watch);
                     if shown(viewer, &notices) && settings.fail_fast {
                         break;
                     }
@@ -242,6 +255,13 @@ fn shown(viewer: &mut impl Viewer, notices: &[Notice]) -> bool {
         viewer.found(notice);
     }
     notices.iter().any(|notice| notice.found.verdict == Verdict::Fail)
+}
+
+/// Tells what somebody has to be told.
+fn tell(viewer: &mut impl Viewer, watch: &mut Watch<'_>) {
+    for alarmed in watch.alarms() {
+        viewer.alarmed(&alarmed);
+    }
 }
 
 /// The contact with the time that is unseen right now.

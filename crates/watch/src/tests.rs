@@ -105,6 +105,138 @@ fn what_a_vehicle_does_and_how_fast_is_known_at_a_glance() {
     insta::assert_snapshot!(page);
 }
 
+/// The time at which a message of that number comes.
+fn at(library: &Library, number: u64) -> Stamp {
+    message(library, "state", number, json!({})).0
+}
+
+fn watches_silence(library: &Library) -> Watch<'_> {
+    let options = Options {
+        only: vec![PERIOD.to_owned()],
+        ..Options::default()
+    };
+    Watch::new(&library.rules, options).expect("options")
+}
+
+#[test]
+fn a_vehicle_that_falls_silent_while_it_is_online_is_found_once() {
+    let library = tck_testing::library();
+    let mut watch = watches_silence(library);
+    let online = json!({ "connectionState": "ONLINE" });
+    shown(&mut watch, message(library, "connection", 1, online.clone()));
+    shown(&mut watch, message(library, "state", 2, json!({})));
+    // What is said to it is no sign of life.
+    shown(&mut watch, message(library, "order", 150, json!({ "orderId": "o" })));
+    assert!(watch.pass(at(library, 156)).is_empty() && watch.alarms().is_empty());
+    let notices = watch.pass(at(library, 160));
+    let found: Vec<(&str, &str, Verdict, u64)> = notices
+        .iter()
+        .map(|notice| {
+            let found = &notice.found;
+            (&*found.requirement, &*found.monitor, found.verdict, found.count)
+        })
+        .collect();
+    assert_eq!(found, [("STATE-02", "watch/silence", Verdict::Warning, 1)]);
+    assert!(watch.pass(at(library, 400)).is_empty(), "it is told once");
+    let alarms: Vec<String> = watch.alarms().iter().map(|one| one.alarm.to_string()).collect();
+    assert_eq!(alarms, ["says ONLINE, and no state came for 31 s"]);
+    let glance = watch.glances().next().expect("a vehicle");
+    assert!(glance.is_silent());
+    assert_eq!(glance.last_state(), Some(at(library, 2)));
+    assert_eq!(
+        watch.finish().verdict,
+        Some(Verdict::Warning),
+        "and it goes on at the end"
+    );
+}
+
+#[test]
+fn who_is_back_has_been_silent_once() {
+    let library = tck_testing::library();
+    let mut watch = watches_silence(library);
+    let online = json!({ "connectionState": "ONLINE" });
+    shown(&mut watch, message(library, "connection", 1, online));
+    let rest = |id: u64| {
+        json!({ "headerId": id, "orderId": "", "orderUpdateId": 0, "lastNodeId": "n", "nodeStates": [], "edgeStates": [],
+            "actionStates": [], "driving": false })
+    };
+    // Judging begins at a state that follows another one, at rest.
+    shown(&mut watch, message(library, "state", 2, rest(1)));
+    shown(&mut watch, message(library, "state", 3, rest(2)));
+    assert_eq!(watch.pass(at(library, 200)).len(), 1);
+    shown(&mut watch, message(library, "state", 210, rest(3)));
+    shown(&mut watch, message(library, "state", 211, rest(4)));
+    let words: Vec<&str> = watch.alarms().iter().map(|one| one.alarm.word()).collect();
+    assert_eq!(words, ["silent", "back"]);
+    let glance = watch.glances().next().expect("a vehicle");
+    let kinds: Vec<(Verdict, u64)> = glance.kinds.values().map(|kind| (kind.verdict, kind.count)).collect();
+    assert_eq!(kinds, [(Verdict::Fail, 1)]);
+    let result = watch.finish();
+    let counts: Vec<u64> = result.vehicles[0].sides[0]
+        .findings
+        .iter()
+        .map(|one| one.count)
+        .collect();
+    assert_eq!(counts, [1]);
+}
+
+#[test]
+fn who_is_offline_or_could_not_be_heard_is_not_silent() {
+    let library = tck_testing::library();
+    let mut watch = watches_silence(library);
+    let connection = |state: &str| json!({ "connectionState": state });
+    shown(&mut watch, message(library, "connection", 1, connection("ONLINE")));
+    shown(&mut watch, message(library, "state", 2, json!({})));
+    watch.unseen(at(library, 150).moment);
+    assert!(watch.pass(at(library, 200)).is_empty());
+    shown(&mut watch, message(library, "connection", 201, connection("OFFLINE")));
+    assert!(watch.pass(at(library, 900)).is_empty() && watch.alarms().is_empty());
+    // Of this one no state ever came: it may be the broker that keeps them.
+    let (when, mut stored) = message(library, "connection", 901, connection("ONLINE"));
+    stored.topic = "uagv/v2/acme/8/connection".to_owned();
+    stored.retain = Some(true);
+    watch.take(when, stored);
+    assert!(watch.pass(at(library, 1100)).is_empty());
+    let words: Vec<&str> = watch.alarms().iter().map(|one| one.alarm.word()).collect();
+    assert_eq!(words, ["silent"]);
+}
+
+#[test]
+fn a_broken_connection_a_fatal_error_and_an_emergency_stop_are_told_once() {
+    let library = tck_testing::library();
+    let mut watch = watch(library);
+    let state = |errors: Value, stop: &str| json!({ "errors": errors, "safetyState": { "eStop": stop } });
+    let fatal = json!([{ "errorType": "motor", "errorLevel": "FATAL" }, { "errorType": "x", "errorLevel": "WARNING" }]);
+    let broken = json!({ "connectionState": "CONNECTIONBROKEN" });
+    for one in [
+        message(library, "state", 1, state(json!([]), "NONE")),
+        message(library, "state", 2, state(fatal.clone(), "NONE")),
+        message(library, "state", 3, state(fatal, "MANUAL")),
+        message(library, "state", 4, state(json!([]), "MANUAL")),
+        message(library, "connection", 5, broken.clone()),
+        message(library, "connection", 6, broken),
+    ] {
+        shown(&mut watch, one);
+    }
+    let words: Vec<&str> = watch.alarms().iter().map(|one| one.alarm.word()).collect();
+    assert_eq!(words, ["fatal", "emergency-stop", "connection-broken"]);
+}
+
+#[test]
+fn the_worst_vehicle_comes_first() {
+    let library = tck_testing::library();
+    let mut watch = watch(library);
+    for (number, serial) in [(1, "1"), (2, "2"), (3, "3")] {
+        let word = if serial == "2" { "AWAY" } else { "ONLINE" };
+        let more = json!({ "serialNumber": serial, "connectionState": word });
+        let (when, mut message) = message(library, "connection", number, more);
+        message.topic = format!("uagv/v2/acme/{serial}/connection");
+        watch.take(when, message);
+    }
+    let serials: Vec<&str> = watch.worst_first().iter().map(|one| &*one.serial_number).collect();
+    assert_eq!(serials, ["2", "1", "3"]);
+}
+
 #[test]
 fn messages_are_kept_for_a_while() {
     let mut recent = Recent::default();

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::Format;
+use super::{AccessArgs, Format};
 
 const DISCOVER_HELP: &str = "\
 Examples:
@@ -16,15 +16,9 @@ It only listens: nothing is published. States come at least every 30 s, and reta
 /// Which broker is listened on.
 #[derive(Clone, Debug, Args)]
 pub struct BrokerArgs {
-    /// The broker: mqtt://host:port, or with mqtts, or ws://host:port/path and wss
-    #[arg(long, value_name = "URL", default_value = "mqtt://127.0.0.1:1883")]
-    pub broker: String,
-    /// User name at the broker; its password is taken from the variable `VDA5050_TCK_PASSWORD`
-    #[arg(long, value_name = "NAME")]
-    pub username: Option<String>,
-    /// Whose certificates are trusted at a broker with TLS, as a PEM file
-    #[arg(long, value_name = "FILE")]
-    pub tls_ca: Option<PathBuf>,
+    /// The broker, and how to get in.
+    #[command(flatten)]
+    pub access: AccessArgs,
     /// Topic filter to subscribe to; may be repeated [default: everything]
     #[arg(long, value_name = "FILTER")]
     pub topic: Vec<String>,
@@ -101,6 +95,6 @@ pub struct Init {
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
     /// Write the built-in suites, the schemas for editors and every setting with its default into this folder, and no profile
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["broker", "username", "tls_ca", "topic", "seconds", "manufacturer", "serial", "lif", "file", "force"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["broker", "username", "tls_ca", "client_cert", "client_key", "client_id", "topic", "seconds", "manufacturer", "serial", "lif", "file", "force"])]
     pub suites: Option<PathBuf>,
 }

@@ -100,7 +100,8 @@ Examples:
   vda5050-tck validate device.toml hall.lif.json
   vda5050-tck validate state.json --topic state
   vda5050-tck validate states.jsonl messages/   one message a line, and all JSON files of a folder
-  vda5050-tck validate suites/agv/order-rejection/*.yaml";
+  vda5050-tck validate suites/agv/order-rejection/*.yaml
+  vda5050-tck validate --suites own own/agv/acme/*.yaml own/requirements/*.yaml";
 
 /// `validate`.
 #[derive(Clone, Debug, Args)]
@@ -118,6 +119,9 @@ pub struct Validate {
     /// How findings are written
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
+    /// Which suites.
+    #[command(flatten)]
+    pub suites: SuiteArgs,
 }
 
 const REPORT_HELP: &str = "\

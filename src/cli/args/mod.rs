@@ -168,6 +168,33 @@ pub struct DeviceArgs {
     /// Use this broker instead of the built-in one: mqtt://host:port, or with mqtts, or ws://host:port/path and wss
     #[arg(long, value_name = "URL", help_heading = "Bench")]
     pub broker: Option<String>,
+    /// How the client ids of the harness begin at a broker of your own [default: tck]
+    #[arg(long, value_name = "TEXT", help_heading = "Bench")]
+    pub client_id: Option<String>,
+    /// The certificate that is shown to a broker of your own that asks for one, as a PEM file
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "client_key",
+        alias = "tls-cert",
+        help_heading = "Bench"
+    )]
+    pub client_cert: Option<String>,
+    /// Its key, as a PEM file
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "client_cert",
+        alias = "tls-key",
+        help_heading = "Bench"
+    )]
+    pub client_key: Option<String>,
+    /// Whose certificates are trusted at a broker of your own with TLS, as a PEM file
+    #[arg(long, value_name = "FILE", help_heading = "Bench")]
+    pub tls_ca: Option<String>,
+    /// User name at a broker of your own; its password is taken from the variable `VDA5050_TCK_PASSWORD`
+    #[arg(long, value_name = "NAME", help_heading = "Bench")]
+    pub username: Option<String>,
     /// The device is connected to the broker directly: packets cannot be seen (needs --broker)
     #[arg(long, help_heading = "Bench")]
     pub no_tap: bool,
@@ -191,6 +218,11 @@ impl DeviceArgs {
             ("device.topic-template", &self.topic_template),
             ("bench.listen", &self.listen),
             ("bench.broker", &self.broker),
+            ("bench.client-id", &self.client_id),
+            ("bench.client-cert", &self.client_cert),
+            ("bench.client-key", &self.client_key),
+            ("bench.tls-ca", &self.tls_ca),
+            ("bench.username", &self.username),
         ];
         let flags = [
             ("bench.tap", self.no_tap, "false"),
@@ -267,6 +299,29 @@ pub struct PipelineArgs {
     /// may be repeated (docs/ci.md)
     #[arg(long = "as", value_name = "KIND=FILE", value_parser = rendering::to_file)]
     pub renderings: Vec<RenderedTo>,
+}
+
+/// A broker, and how to get in there with one connection.
+#[derive(Clone, Debug, Args)]
+pub struct AccessArgs {
+    /// The broker: mqtt://host:port, or with mqtts, or ws://host:port/path and wss
+    #[arg(long, value_name = "URL", default_value = "mqtt://127.0.0.1:1883")]
+    pub broker: String,
+    /// User name at the broker; its password is taken from the variable `VDA5050_TCK_PASSWORD`
+    #[arg(long, value_name = "NAME")]
+    pub username: Option<String>,
+    /// Whose certificates are trusted at a broker with TLS, as a PEM file
+    #[arg(long, value_name = "FILE")]
+    pub tls_ca: Option<PathBuf>,
+    /// The certificate that is shown to a broker with TLS that asks for one, as a PEM file
+    #[arg(long, value_name = "FILE", requires = "client_key", alias = "tls-cert")]
+    pub client_cert: Option<PathBuf>,
+    /// Its key, as a PEM file
+    #[arg(long, value_name = "FILE", requires = "client_cert", alias = "tls-key")]
+    pub client_key: Option<PathBuf>,
+    /// MQTT client id; made up unless said
+    #[arg(long, value_name = "ID")]
+    pub client_id: Option<String>,
 }
 
 /// The format of standard output.

@@ -9,8 +9,8 @@ use serde_json::Value;
 use tck_base::diagnostic;
 use tck_profile::{VEHICLE_WORDS, find_vehicle_word};
 
-use super::Format;
 use super::vehicle::VehicleKind;
+use super::{AccessArgs, Format};
 
 /// `simulate`.
 #[derive(Clone, Debug, Args)]
@@ -58,15 +58,9 @@ pub struct SimulatedSite {
 /// How a simulated device reaches its broker.
 #[derive(Clone, Debug, Args)]
 pub struct ConnectionArgs {
-    /// The broker: mqtt://host:port, or with mqtts, or ws://host:port/path and wss
-    #[arg(long, value_name = "URL", default_value = "mqtt://127.0.0.1:1883")]
-    pub broker: String,
-    /// User name at the broker; its password is taken from the variable `VDA5050_TCK_PASSWORD`
-    #[arg(long, value_name = "NAME")]
-    pub username: Option<String>,
-    /// Whose certificates are trusted at a broker with TLS, as a PEM file
-    #[arg(long, value_name = "FILE")]
-    pub tls_ca: Option<PathBuf>,
+    /// The broker, and how to get in.
+    #[command(flatten)]
+    pub access: AccessArgs,
     /// Protocol version it speaks; the newest one unless said
     #[arg(long, value_name = "VERSION")]
     pub protocol: Option<String>,

@@ -10,6 +10,7 @@ use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 
 use super::keyboard::typed;
+use tck_watch::alarm::Alarmed;
 use tck_watch::session::{Contact, Happening, Viewer};
 use tck_watch::{Notice, Watch};
 use view::{Focus, View};
@@ -54,8 +55,18 @@ impl Viewer for FullScreen {
         };
     }
 
+    fn alarmed(&mut self, alarmed: &Alarmed) {
+        let Alarmed {
+            manufacturer,
+            serial_number,
+            at,
+            alarm,
+        } = alarmed;
+        self.view.note = format!("{at:.0} {manufacturer} {serial_number}: {alarm}");
+    }
+
     fn tick(&mut self, watch: &Watch<'_>, contact: Contact) -> bool {
-        let glances: Vec<_> = watch.glances().collect();
+        let glances = watch.worst_first();
         loop {
             match typed(Duration::ZERO) {
                 Ok(None) => break,

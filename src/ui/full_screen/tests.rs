@@ -37,7 +37,7 @@ fn state(version: &str, serial: &str, mode: &str) -> serde_json::Value {
 
 fn screen(view: &mut View, watch: &Watch<'_>) -> String {
     let mut terminal = Terminal::new(TestBackend::new(150, 44)).expect("terminal");
-    let glances: Vec<_> = watch.glances().collect();
+    let glances = watch.worst_first();
     view.choose(&glances);
     let contact = Contact {
         connected: true,
@@ -73,8 +73,6 @@ fn vehicles_findings_and_the_wrong_member_are_shown() {
     );
     heard(&mut watch, "1", "state", &state(&version, "1", "AUTOMATIC"));
     heard(&mut watch, "2", "state", &state(&version, "2", "AUTOMATISCH"));
-    insta::assert_snapshot!("faultless", screen(&mut view, &watch));
-    assert!(key(&mut view, KeyCode::Down) && key(&mut view, KeyCode::Down));
     insta::assert_snapshot!("marked", screen(&mut view, &watch));
     key(&mut view, KeyCode::Tab);
     for _ in 0..4 {
@@ -82,6 +80,19 @@ fn vehicles_findings_and_the_wrong_member_are_shown() {
     }
     let moved = screen(&mut view, &watch);
     assert!(moved.contains("\"headerId\": 1"), "{moved}");
+    key(&mut view, KeyCode::Tab);
+    assert!(key(&mut view, KeyCode::Down) && key(&mut view, KeyCode::Down));
+    insta::assert_snapshot!("faultless", screen(&mut view, &watch));
+    // It stays the chosen one when it becomes the worst.
+    heard(
+        &mut watch,
+        "1",
+        "state",
+        &json!({ "headerId": "one", "errors": 7, "orderId": 3 }),
+    );
+    let worse = screen(&mut view, &watch);
+    assert!(worse.find("acme 1") < worse.find("acme 2"), "{worse}");
+    assert!(worse.contains("acme/1/state"), "{worse}");
     assert!(!key(&mut view, KeyCode::Char('q')));
     let interrupt = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
     assert!(!press(&mut view, interrupt));

@@ -25,6 +25,10 @@ pub(super) struct View {
     pub note: String,
     pub focus: Focus,
     vehicle: usize,
+    /// Manufacturer and serial number of the vehicle that somebody has chosen; until then it is the worst.
+    chosen: Option<(String, String)>,
+    /// Whether somebody has just chosen another one.
+    chooses: bool,
     finding: usize,
     /// Lines the message is moved up, beside what shows the mark.
     moved: i32,
@@ -37,6 +41,8 @@ impl View {
             note: String::new(),
             focus: Focus::Vehicles,
             vehicle: 0,
+            chosen: None,
+            chooses: false,
             finding: 0,
             moved: 0,
         }
@@ -48,6 +54,7 @@ impl View {
         match self.focus {
             Focus::Vehicles => {
                 self.vehicle = self.vehicle.saturating_add_signed(by);
+                self.chooses = true;
                 self.finding = 0;
             }
             Focus::Findings => self.finding = self.finding.saturating_add_signed(by),
@@ -62,6 +69,15 @@ impl View {
     /// Keeps the choice among what there is.
     pub fn choose(&mut self, glances: &[&Glance]) {
         self.vehicle = self.vehicle.min(glances.len().saturating_sub(1));
+        if std::mem::take(&mut self.chooses) {
+            let chosen = glances.get(self.vehicle);
+            self.chosen = chosen.map(|glance| (glance.manufacturer.clone(), glance.serial_number.clone()));
+        } else if let Some((manufacturer, serial_number)) = &self.chosen {
+            // Others may have moved past it since.
+            let is_chosen =
+                |glance: &&Glance| glance.manufacturer == *manufacturer && glance.serial_number == *serial_number;
+            self.vehicle = glances.iter().position(is_chosen).unwrap_or(self.vehicle);
+        }
         let kinds = glances.get(self.vehicle).map_or(0, |glance| glance.kinds.len());
         self.finding = self.finding.min(kinds.saturating_sub(1));
     }

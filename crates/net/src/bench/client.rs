@@ -294,11 +294,11 @@ fn short(error: &ConnectionError) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::endpoint::Credentials;
+    use crate::bench::endpoint::{Access, Credentials};
 
     #[test]
     fn a_loss_is_told_with_what_can_be_done() {
-        let mut endpoint = Endpoint::parse("mqtt://broker.local", None, None).unwrap();
+        let mut endpoint = Endpoint::parse("mqtt://broker.local", &Access::default()).unwrap();
         let told = |error: ConnectionError, accepted, endpoint: &Endpoint| why(&error, accepted, endpoint);
         let refused = || ConnectionError::ConnectionRefused(ConnectReturnCode::NotAuthorized);
         let reset = || ConnectionError::MqttState(StateError::Io(std::io::ErrorKind::ConnectionReset.into()));

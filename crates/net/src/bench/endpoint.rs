@@ -1,12 +1,12 @@
 //! Where a broker is and how to get in.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use tokio_rustls::rustls::ClientConfig;
 
 use crate::bench::LinkError;
-use crate::bench::tls;
+use crate::bench::tls::{self, TlsFiles};
 use tck_profile::Secrets;
 
 /// The path of a WebSocket unless said, as most brokers have it.
@@ -30,6 +30,19 @@ impl std::fmt::Debug for Credentials {
     }
 }
 
+/// How to get in at a broker.
+#[derive(Clone, Debug, Default)]
+pub struct Access {
+    /// PEM file to check its certificate against, instead of what the system trusts.
+    pub authority: Option<PathBuf>,
+    /// The certificate that is shown to a broker with TLS that asks for one.
+    pub identity: Option<TlsFiles>,
+    /// How to log in.
+    pub credentials: Option<Credentials>,
+    /// The client id of whoever has one connection there; made up unless the broker prescribes one.
+    pub client_id: Option<String>,
+}
+
 /// A broker.
 #[derive(Clone, Debug)]
 pub struct Endpoint {
@@ -45,6 +58,8 @@ pub struct Endpoint {
     pub authority: Option<PathBuf>,
     /// How to log in.
     pub credentials: Option<Credentials>,
+    /// The client id of whoever has one connection there, where it is prescribed.
+    pub client_id: Option<String>,
 }
 
 impl Endpoint {
@@ -58,16 +73,16 @@ impl Endpoint {
             websocket: None,
             authority: None,
             credentials: None,
+            client_id: None,
         }
     }
 
     /// Reads `mqtt://host:port`, `mqtts://host:port`, `ws://host:port/path`, `wss://host:port/path` or `host:port`; port
-    /// and path may be left out. `authority` is a PEM file to check the certificate of a broker with TLS against, instead
-    /// of what the system trusts.
+    /// and path may be left out.
     ///
     /// # Errors
     /// [`LinkError::Setup`] when the address cannot be read or the certificates do not work.
-    pub fn parse(url: &str, authority: Option<&Path>, credentials: Option<Credentials>) -> Result<Self, LinkError> {
+    pub fn parse(url: &str, access: &Access) -> Result<Self, LinkError> {
         let wrong = |what: &str| {
             let shown = Secrets::default().out_of(url);
             LinkError::Setup(format!("`{shown}` is not a broker: {what}"))
@@ -113,10 +128,15 @@ impl Endpoint {
         Ok(Self {
             host: host.to_owned(),
             port,
-            tls: if secure { Some(tls::client(authority)?) } else { None },
+            tls: if secure {
+                Some(tls::client(access.authority.as_deref(), access.identity.as_ref())?)
+            } else {
+                None
+            },
             websocket: web.then(|| path.to_owned()),
-            authority: authority.map(Path::to_path_buf),
-            credentials,
+            authority: access.authority.clone(),
+            credentials: access.credentials.clone(),
+            client_id: access.client_id.clone(),
         })
     }
 
@@ -168,7 +188,7 @@ mod tests {
             ("mqtt://[::1]:1885", "::1", 1885),
             ("::1", "::1", 1883),
         ] {
-            let endpoint = Endpoint::parse(url, None, None).unwrap();
+            let endpoint = Endpoint::parse(url, &Access::default()).unwrap();
             assert_eq!((endpoint.host.as_str(), endpoint.port), (host, port), "{url}");
         }
     }
@@ -176,7 +196,7 @@ mod tests {
     #[test]
     fn a_websocket_has_a_path() {
         let read = |url| {
-            let endpoint = Endpoint::parse(url, None, None).unwrap();
+            let endpoint = Endpoint::parse(url, &Access::default()).unwrap();
             (endpoint.address(), endpoint.websocket.clone().unwrap())
         };
         let expected = |address: &str, path: &str| (address.to_owned(), path.to_owned());
@@ -186,7 +206,7 @@ mod tests {
             read("ws://[::1]:9001/a/b?token=c"),
             expected("[::1]:9001", "/a/b?token=c")
         );
-        let shown = Endpoint::parse("ws://[::1]:9001/a/b?token=c", None, None)
+        let shown = Endpoint::parse("ws://[::1]:9001/a/b?token=c", &Access::default())
             .unwrap()
             .url();
         assert_eq!(shown, "ws://[::1]:9001/a/b");
@@ -200,7 +220,7 @@ mod tests {
             ("mqtt://x:99999", "port"),
             ("mqtt://user:secret@x", "given apart"),
         ] {
-            let error = Endpoint::parse(url, None, None).unwrap_err().to_string();
+            let error = Endpoint::parse(url, &Access::default()).unwrap_err().to_string();
             assert!(error.contains(reason) && !error.contains("secret"), "{error}");
         }
     }

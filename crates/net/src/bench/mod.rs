@@ -7,6 +7,7 @@ pub mod endpoint;
 mod heard;
 pub mod inbox;
 pub mod kin;
+pub mod leavings;
 pub mod listen;
 pub mod own;
 pub mod stream;

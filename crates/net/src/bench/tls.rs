@@ -10,7 +10,7 @@ use tokio_rustls::rustls::{ClientConfig, RootCertStore, ServerConfig};
 
 use crate::bench::LinkError;
 
-/// The certificate the tap shows to the device.
+/// A certificate that is shown: by the tap to the device, or to a broker.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TlsFiles {
     /// PEM file with the certificate chain.
@@ -30,8 +30,9 @@ pub(crate) fn server(files: &TlsFiles) -> Result<Arc<ServerConfig>, LinkError> {
     Ok(Arc::new(config))
 }
 
-/// Configuration of the side towards the broker; trusts `authority`, or what the system trusts.
-pub(crate) fn client(authority: Option<&Path>) -> Result<Arc<ClientConfig>, LinkError> {
+/// Configuration of the side towards the broker; trusts `authority`, or what the system trusts, and shows `identity` where it
+/// is asked for one.
+pub(crate) fn client(authority: Option<&Path>, identity: Option<&TlsFiles>) -> Result<Arc<ClientConfig>, LinkError> {
     let mut roots = RootCertStore::empty();
     match authority {
         Some(path) => {
@@ -51,8 +52,16 @@ pub(crate) fn client(authority: Option<&Path>) -> Result<Arc<ClientConfig>, Link
     let config = ClientConfig::builder_with_provider(ring::default_provider().into())
         .with_safe_default_protocol_versions()
         .map_err(|error| LinkError::Setup(error.to_string()))?
-        .with_root_certificates(roots)
-        .with_no_client_auth();
+        .with_root_certificates(roots);
+    let config = match identity {
+        None => config.with_no_client_auth(),
+        Some(files) => {
+            let key = PrivateKeyDer::from_pem_file(&files.key).map_err(|error| unreadable(&files.key, &error))?;
+            let config = config.with_client_auth_cert(certificates(&files.certificate)?, key);
+            config
+                .map_err(|error| LinkError::Setup(format!("certificate and key for the broker do not work: {error}")))?
+        }
+    };
     Ok(Arc::new(config))
 }
 
@@ -89,7 +98,7 @@ mod tests {
     fn a_file_without_a_certificate_is_named() {
         let file = tempfile::NamedTempFile::new().unwrap();
         assert!(
-            client(Some(file.path()))
+            client(Some(file.path()), None)
                 .unwrap_err()
                 .to_string()
                 .contains("no certificate")

@@ -274,15 +274,7 @@ impl Reader<'_> {
 
     fn deviation(&mut self, (name, value): Entry<'_, '_>) {
         let id = name.get_ref().as_ref();
-        let is_id = id.rsplit_once('-').is_some_and(|(group, number)| {
-            group.starts_with(|c: char| c.is_ascii_uppercase())
-                && group
-                    .chars()
-                    .all(|c| c.is_ascii_uppercase() || c.is_ascii_digit() || c == '-')
-                && number.len() >= 2
-                && number.chars().all(|c| c.is_ascii_digit())
-        });
-        if !is_id {
+        if !RequirementId::is_one(id) {
             let title = format!("`{id}` is not the id of a requirement");
             let hint = "an id looks like ORD-REJ-03; `vda5050-tck list requirements` shows them all".to_owned();
             self.complain("bad-value", name.span(), &title, "not an id", Some(hint));

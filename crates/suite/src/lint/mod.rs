@@ -22,8 +22,8 @@ use self::paths::Topic;
 use self::scope::Scope;
 use super::CheckInfo;
 use super::fields::Problems;
-use super::model::{About, Assertion, Binding, Monitor, Need, Rule, Selection, Test, Verb};
-use tck_base::diagnostic::{Diagnostic, Span, did_you_mean};
+use super::model::{About, Assertion, Binding, CheckUse, Monitor, Need, Rule, Selection, Test, Verb};
+use tck_base::diagnostic::{Diagnostic, Span, closest, did_you_mean};
 use tck_base::pattern::Pattern;
 use tck_course::is_station;
 use tck_pack::{RequirementId, Role, Version, VersionRange};
@@ -249,7 +249,10 @@ impl Linter<'_> {
                         .flat_map(|actions| actions.into_iter().map(|(name, _)| name))
                         .collect();
                     let names: Vec<&str> = names.iter().map(String::as_str).collect();
-                    self.problems.unknown("unknown-action", at, "action", name, names);
+                    // A vehicle may have actions of its own, which its factsheet lists; what looks like a slip is one.
+                    if closest(name, names.iter().copied()).is_some() {
+                        self.problems.unknown("unknown-action", at, "action", name, names);
+                    }
                 }
             }
             Need::Hook(name) => self.hook(name, &[], at),

@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use crate::bench::endpoint::{Credentials, Endpoint};
+use crate::bench::endpoint::{Access, Endpoint};
 use crate::bench::own::OwnNames;
 use crate::bench::tls::TlsFiles;
 use tck_base::clock::WallClock;
@@ -21,10 +21,8 @@ pub enum BrokerChoice {
     External {
         /// `mqtt://host:port`, or with `mqtts`, `ws` or `wss`.
         url: String,
-        /// PEM file to check its certificate against.
-        authority: Option<PathBuf>,
-        /// How the harness logs in. The device's own credentials pass the tap untouched.
-        credentials: Option<Credentials>,
+        /// How the harness gets in. The device's own credentials pass the tap untouched.
+        access: Access,
     },
 }
 

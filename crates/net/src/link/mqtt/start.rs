@@ -35,11 +35,7 @@ impl MqttBench {
                 let endpoint = Endpoint::plain(broker.address());
                 (Some(broker), endpoint)
             }
-            BrokerChoice::External {
-                url,
-                authority,
-                credentials,
-            } => (None, Endpoint::parse(url, authority.as_deref(), credentials.clone())?),
+            BrokerChoice::External { url, access } => (None, Endpoint::parse(url, access)?),
         };
         let upstream = Upstream {
             broker: endpoint.clone(),
