@@ -22,7 +22,7 @@ use self::paths::Topic;
 use self::scope::Scope;
 use super::CheckInfo;
 use super::fields::Problems;
-use super::model::{About, Assertion, Binding, CheckUse, Monitor, Need, Rule, Selection, Test, Verb};
+use super::model::{About, Assertion, Binding, Monitor, Need, Rule, Selection, Test, Verb};
 use tck_base::diagnostic::{Diagnostic, Span, closest, did_you_mean};
 use tck_base::pattern::Pattern;
 use tck_course::is_station;
