@@ -28,7 +28,8 @@ enum Risk {
 
 /// The tests by what they may do to the vehicle; where that is the same, as they stood.
 pub(super) fn by_risk(tests: &mut [std::sync::Arc<Test>]) {
-    tests.sort_by_key(|test| risk(test));
+    // Once for each test: the texts of its steps are searched.
+    tests.sort_by_cached_key(|test| risk(test));
 }
 
 fn risk(test: &Test) -> Risk {
