@@ -101,7 +101,7 @@ fn every_member_that_a_check_reads_is_one_of_some_version() {
             assert!(is_known, "{} reads `{name}`, which no version has", file.display());
         }
     }
-    assert!(seen > 100, "only {seen} members were found in the code");
+    assert!(seen > 40, "only {seen} members were found in the code");
 }
 
 #[test]
