@@ -604,16 +604,6 @@ fn every_module_says_what_it_is_for() {
     assert!(silent.is_empty(), "{silent:?}");
 }
 
-#[test]
-fn no_file_is_two_ideas() {
-    let long: Vec<String> = sources()
-        .iter()
-        .filter(|(path, text)| text.lines().count() > 600 && !is_test_file(path))
-        .map(|(path, text)| format!("{}: {}", in_room(path), text.lines().count()))
-        .collect();
-    assert!(long.is_empty(), "{long:?}");
-}
-
 /// No code line of these modules names one of these words, but in these places.
 fn refuse(modules: &[&str], words: &[&str], places: &[&str]) {
     let mut wrong = Vec::new();
