@@ -310,10 +310,11 @@ fn whatever_the_seed_the_verdicts_are_the_same() {
     same_verdicts(0..6);
 }
 
+/// Twenty of them meet each jitter with each coalescing once.
 #[test]
 #[ignore = "takes a minute; CI runs it"]
-fn with_fifty_seeds_the_verdicts_are_the_same() {
-    same_verdicts(0..50);
+fn with_twenty_seeds_the_verdicts_are_the_same() {
+    same_verdicts(0..20);
 }
 
 fn same_verdicts(seeds: std::ops::Range<u64>) {

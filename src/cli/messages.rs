@@ -267,8 +267,8 @@ fn whereabouts(flaw: &Flaw, topic: &str, text: &[u8], value: Option<&Value>) -> 
     };
     let is_meant = |pointer: &str| {
         let name = pointer.rsplit('/').next().unwrap_or_default();
-        flaw.text
-            .contains(&JsonProblem::DuplicateMember(name.to_owned()).to_string())
+        let problem = JsonProblem::DuplicateMember(name.to_owned());
+        flaw.text.contains(&Value::from(problem.to_string()).to_string())
     };
     let mut repeated = place::repeated(text).into_iter();
     if let Some((pointer, name)) = repeated.find(|(pointer, _)| is_meant(pointer)) {
