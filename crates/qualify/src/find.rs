@@ -1,5 +1,6 @@
 //! The shortest way to see that a fault is found: the tests about its first requirement, a few at a time; then each of them
-//! by itself; then all that concern it; then all cases of the tables that are drawn from; then everything.
+//! by itself; then all that concern it; then all cases of the tables that are drawn from; then one test of each folder,
+//! in which monitors see what a device does everywhere; then everything.
 
 use std::collections::BTreeSet;
 
@@ -54,8 +55,10 @@ pub(super) fn find(grounds: &Grounds<'_>, role: Role, fault: &Fault) -> Result<K
             return Ok(kill);
         }
     }
+    let tour = grounds.one_of_each_folder();
     let _ = tried(DRAWN, &|test| concerns(fault, test))?
         || tried(None, &|test| test.drawn.is_some() && concerns(fault, test))?
+        || tried(DRAWN, &|test| tour.contains(test.table()))?
         || tried(DRAWN, &|_| true)?;
     Ok(kill)
 }

@@ -89,6 +89,14 @@ impl Grounds<'_> {
             .collect()
     }
 
+    /// The first test of each folder.
+    pub(super) fn one_of_each_folder(&self) -> BTreeSet<&str> {
+        let folder = |table: &str| table.split('/').next().map(str::to_owned);
+        let mut seen = BTreeSet::new();
+        let tables = self.tables().into_iter();
+        tables.filter(|table| seen.insert(folder(table))).collect()
+    }
+
     /// Runs these tests with a fault: on the usual device, and on the others where they alone decide what the fault
     /// breaks. `draw` is how much is taken of tables that are drawn from; all of it unless said.
     ///
