@@ -1,6 +1,5 @@
 //! A record as it concerns one vehicle: whose message it is, on which topic, how it was seen, and what the link was like.
 
-use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,12 +10,11 @@ use tck_journal::event::{Direction, Event, LinkFault, Packet};
 use tck_journal::{Entry, Parsed, Payload};
 use tck_pack::{Pack, Role};
 use tck_view::{
-    ConnectionView, FactsheetView, InstantActionsView, MessageView, Names, OrderView, StateView, Topic,
+    ConnectionView, FactsheetView, Header, InstantActionsView, MessageView, Names, OrderView, Print, StateView, Topic,
     VisualizationView,
 };
 
 use crate::listen::{Kind, Seen};
-use crate::print;
 use crate::topics::{Named, Topics};
 
 /// What is known of the link to the device under test.
@@ -75,7 +73,6 @@ impl Observer {
             link: self.link,
             role: self.role,
             kind,
-            content: OnceCell::new(),
         }
     }
 
@@ -146,7 +143,6 @@ pub struct Observation<'a> {
     pub link: Link,
     role: Role,
     kind: Kind,
-    content: OnceCell<Option<u64>>,
 }
 
 /// A message of the device under test.
@@ -196,6 +192,25 @@ impl<'a> Observation<'a> {
     #[must_use]
     pub fn message(&self) -> Option<&'a MessageView> {
         self.entry.view(self.topic()?, self.names)
+    }
+
+    /// The message as one of another topic, on which it may have been meant; `None` when it is no JSON.
+    #[must_use]
+    pub fn message_as(&self, topic: Topic) -> Option<&'a MessageView> {
+        self.entry.view(topic, self.names)
+    }
+
+    /// The header of the message, whatever its topic; `None` when it is no JSON.
+    #[must_use]
+    pub fn header(&self) -> Option<&'a Header> {
+        let message = self.message_as(self.topic().unwrap_or(Topic::Other));
+        message.map(MessageView::header)
+    }
+
+    /// A connection message, whoever sent it and however it was seen. It may be no object.
+    #[must_use]
+    pub fn connection_message(&self) -> Option<&'a Arc<ConnectionView>> {
+        self.message()?.connection()
     }
 
     /// What the version calls the members of messages: to show one as evidence.
@@ -375,12 +390,6 @@ impl<'a> Observation<'a> {
         self.to_vehicle(Topic::InstantActions)?.instant_actions()
     }
 
-    /// The JSON of a message towards the vehicle on that topic, from the harness or from a master control that was recorded.
-    #[must_use]
-    pub fn to_vehicle_json(&self, topic: Topic) -> Option<&'a Value> {
-        self.is_to_vehicle(topic).then(|| self.json()).flatten()
-    }
-
     /// What a mock vehicle of the harness says on that topic, if it is an object.
     #[must_use]
     pub fn said(&self, topic: Topic) -> Option<&'a MessageView> {
@@ -404,13 +413,6 @@ impl<'a> Observation<'a> {
     #[must_use]
     pub fn said_factsheet(&self) -> Option<&'a Arc<FactsheetView>> {
         self.said(Topic::Factsheet)?.factsheet()
-    }
-
-    /// The JSON of what a mock vehicle of the harness says on that topic, if it is an object.
-    #[must_use]
-    pub fn said_json(&self, topic: Topic) -> Option<&'a Value> {
-        let value = self.is(Seen::Sent, topic).then(|| self.json()).flatten();
-        value.filter(|value| value.is_object())
     }
 
     /// A PUBLISH packet of the device.
@@ -466,10 +468,10 @@ impl<'a> Observation<'a> {
         self.connects() || self.is_delivered(Topic::Connection)
     }
 
-    /// A print of the message without what changes when it is sent again; worked out once.
+    /// The fingerprint of the message without what changes when it is sent again.
     #[must_use]
-    pub fn content(&self) -> Option<u64> {
-        *self.content.get_or_init(|| self.json().map(print::of_content))
+    pub fn content(&self) -> Option<Print> {
+        self.message().map(MessageView::content)
     }
 }
 

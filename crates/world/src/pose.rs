@@ -1,16 +1,15 @@
 //! Where a state shows the vehicle.
 
-use serde_json::Value;
 use tck_view::{Member, Number, StateView};
 
-/// A number member that can be calculated with.
-pub(crate) fn finite(value: &Value, name: &str) -> Option<f64> {
-    value.get(name)?.as_f64().filter(|number| number.abs() < 1e9)
+/// Whether a number can be calculated with.
+pub(crate) fn is_sane(number: f64) -> bool {
+    number.abs() < 1e9
 }
 
 /// A number that can be calculated with.
 pub(crate) fn sane(member: &Member<Number>) -> Option<f64> {
-    member.float().filter(|number| number.abs() < 1e9)
+    member.float().filter(|number| is_sane(*number))
 }
 
 /// agvPosition, where it is initialized and complete.

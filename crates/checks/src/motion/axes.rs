@@ -2,6 +2,7 @@
 
 use super::found;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_view::{Node, StateView};
 use tck_world::{Fact, Listen, Observation, OrderedPlace, Pose, Topic};
 
 /// `motion/axes`.
@@ -14,7 +15,7 @@ pub(crate) const AXES: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
-    needs: &[],
+    needs: &[StateView::position, Node::node_position],
     start: |_| Box::new(Axes::default()),
 };
 
