@@ -3,10 +3,19 @@
 use std::f64::consts::PI;
 
 use tck_base::nurbs::{Beside, Path};
-use tck_view::{Deviation, Edge, Node, NodePosition};
+use tck_view::{Deviation, Edge, Member, Node, NodePosition, Number, Pose, Text};
 
 use crate::ordered::curve;
-use crate::pose::{Pose, is_sane, sane};
+
+/// Whether a number can be calculated with.
+fn is_sane(number: f64) -> bool {
+    number.abs() < 1e9
+}
+
+/// A number that can be calculated with.
+pub(crate) fn sane(member: &Member<Number>) -> Option<f64> {
+    member.float().filter(|number| is_sane(*number))
+}
 
 /// An angle brought into -π … π.
 #[must_use]
@@ -24,8 +33,8 @@ pub fn apart(one: f64, other: f64) -> f64 {
 /// nodePosition of an ordered node.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OrderedPlace {
-    /// mapId.
-    pub map: String,
+    /// mapId; empty where the order names none.
+    pub map: Text,
     /// Metres.
     pub x: f64,
     /// Metres.
@@ -71,7 +80,7 @@ impl OrderedPlace {
     fn read(position: &NodePosition) -> Option<Self> {
         let deviation = position.allowed_deviation_xy.there();
         Some(Self {
-            map: position.map_id.or_empty().to_owned(),
+            map: position.map_id.there().cloned().unwrap_or_default(),
             x: sane(&position.x)?,
             y: sane(&position.y)?,
             theta: sane(&position.theta),
@@ -227,7 +236,7 @@ impl Lane {
             .demands
             .path
             .as_ref()
-            .filter(|_| pose.map == from.map && pose.map == to.map)?;
+            .filter(|_| pose.map_id == from.map && pose.map_id == to.map)?;
         let beside = path.beside(pose.x, pose.y)?;
         let spot = path.at(beside.made)?;
         let straight = Path::through([(from.x, from.y), (to.x, to.y)]);
@@ -252,7 +261,7 @@ impl Lane {
     pub fn along(&self, pose: &Pose) -> Option<Along> {
         let (from, to) = (self.from.place.as_ref()?, self.to.place.as_ref()?);
         let heading = self.heading()?;
-        if pose.map != from.map {
+        if pose.map_id != from.map {
             return None;
         }
         let (x, y) = (pose.x - from.x, pose.y - from.y);

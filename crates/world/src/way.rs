@@ -6,12 +6,11 @@ use std::time::Duration;
 
 use tck_base::clock::Moment;
 
-use crate::lane::{Demands, Lane, OrderedNode};
+use crate::lane::{Demands, Lane, OrderedNode, sane};
 use crate::observation::Observation;
 use crate::orders::{Element, OrdersSent, edges_left, nodes_left};
-use crate::pose::{Pose, sane};
 use crate::shown::ShownOrder;
-use tck_view::{Element as Ordered, OrderView, StateView};
+use tck_view::{Element as Ordered, OrderView, Pose, StateView};
 
 /// How many order messages are kept, and how many elements of each.
 const MESSAGES: usize = 64;
@@ -237,7 +236,8 @@ impl Way {
             fresh: true,
             lane,
             ahead,
-            pose: Pose::read(state),
+            // An angle far beyond pi is in other units.
+            pose: state.pose().filter(|pose| pose.theta.abs() < 3.2),
             velocity: Velocity::read(state),
             driving: state.driving.flag(),
             base_done: !nodes.iter().any(is_ahead),

@@ -5,8 +5,8 @@ use serde_json::Value;
 use super::node_tolerance::margin;
 use super::{found, softly};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_view::{Edge, FactsheetView, PhysicalParameters, StateView};
-use tck_world::{Fact, Lane, Listen, Observation, Pose, Topic};
+use tck_view::{Edge, FactsheetView, PhysicalParameters, Pose, StateView};
+use tck_world::{Fact, Lane, Listen, Observation, Topic};
 
 /// `motion/corridor`.
 pub(crate) const CORRIDOR: Check = Check {

@@ -101,7 +101,7 @@ impl Running for NodeTheta {
         else {
             return false;
         };
-        let Some(theta) = place.theta.filter(|_| pose.map == place.map) else {
+        let Some(theta) = place.theta.filter(|_| pose.map_id == place.map) else {
             return false;
         };
         let allowed = place.deviation_theta.filter(|allowed| *allowed > 0.0).unwrap_or(USUAL);

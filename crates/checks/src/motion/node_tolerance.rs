@@ -77,7 +77,7 @@ impl Running for NodeTolerance {
         else {
             return false;
         };
-        let Some(allowed) = place.deviation.filter(|_| pose.map == place.map) else {
+        let Some(allowed) = place.deviation.filter(|_| pose.map_id == place.map) else {
             return false;
         };
         let limit = allowed.max(self.usual) + SLACK;
