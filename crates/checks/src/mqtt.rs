@@ -104,6 +104,8 @@ struct Opened {
     level: u8,
     keep_alive: u16,
     will: Option<Will>,
+    /// The name of the topic on which the will is.
+    will_topic: Option<String>,
     /// Whether it published something else of the protocol.
     publishes: bool,
 }
@@ -139,6 +141,7 @@ impl Running for Connect {
                 level: *level,
                 keep_alive: *keep_alive,
                 will: will.clone(),
+                will_topic: record.will_topic_name().map(str::to_owned),
                 publishes: false,
             });
             return false;
@@ -200,7 +203,7 @@ impl Opened {
             findings.push(broken("CONN-01", seq, "the connection has no last will"));
             return;
         };
-        if context.topic_name(&will.topic) != Some("connection") {
+        if self.will_topic.as_deref() != Some(Topic::Connection.as_str()) {
             let text = format!(
                 "the last will is on {}, not on the connection topic",
                 quote(&will.topic)

@@ -9,7 +9,7 @@ use super::header::serial_character;
 use crate::finding::{broken, quote, remark};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::event::{Event, Packet};
+use tck_journal::event::Event;
 use tck_pack::Role;
 use tck_view::{ConnectionView, FactsheetView, Field, Header, MessageView, StateView, Topic};
 use tck_world::ordered::short;
@@ -441,18 +441,13 @@ impl Running for OwnSide {
             Role::Agv => "master control",
             Role::MasterControl => "the vehicle",
         };
-        if let Event::Packet {
-            packet: Packet::Connect { will: Some(will), .. },
-            ..
-        } = record.event()
-        {
-            let name = context.topic_name(&will.topic);
-            let rule = name.and_then(|name| context.pack.topic(name));
-            if let Some(name) = name.filter(|_| rule.is_some_and(|rule| rule.publisher != context.role)) {
+        if let Some(name) = record.will_topic_name() {
+            let rule = context.pack.topic(name);
+            if rule.is_some_and(|rule| rule.publisher != context.role) {
                 let text = format!("the device has a last will on {name}, which belongs to {owner}");
                 findings.push(broken("TOPIC-15", record.seq(), text));
             }
-            return name.is_some();
+            return true;
         }
         let Some(name) = record.device_publish().and(record.topic_name()) else {
             return false;

@@ -11,6 +11,7 @@
 mod displaced;
 mod factsheets;
 mod fleet;
+mod instant;
 mod lane;
 mod listen;
 mod malformed;
@@ -29,6 +30,7 @@ mod world;
 pub use displaced::Displaced;
 pub use factsheets::{Factsheet, Factsheets, Offered};
 pub use fleet::{FleetSeen, takes};
+pub use instant::InstantActionsSent;
 pub use lane::{Along, Bend, Corridor, Demands, Lane, OrderedNode, OrderedPlace, apart, wrapped};
 pub use listen::{Kind, Listen, Listens, Seen};
 pub use malformed::MalformedOrders;

@@ -69,6 +69,7 @@ impl Observer {
             entry,
             seen: way,
             named,
+            topics: &self.topics,
             names: &self.names,
             link: self.link,
             role: self.role,
@@ -138,6 +139,7 @@ pub struct Observation<'a> {
     /// How a message was seen, if this is about one.
     pub seen: Option<Seen>,
     named: Option<&'a Named>,
+    topics: &'a Topics,
     names: &'a Names,
     /// What the link is like, this record included.
     pub link: Link,
@@ -254,6 +256,19 @@ impl<'a> Observation<'a> {
     #[must_use]
     pub fn topic_name(&self) -> Option<&'a str> {
         self.named.map(|named| named.name.as_str())
+    }
+
+    /// The name of the topic of the vehicle on which a connection that is opened has its last will.
+    #[must_use]
+    pub fn will_topic_name(&self) -> Option<&'a str> {
+        let Event::Packet {
+            packet: Packet::Connect { will: Some(will), .. },
+            ..
+        } = self.event()
+        else {
+            return None;
+        };
+        self.topics.of(&will.topic).map(|named| named.name.as_str())
     }
 
     /// Whether it is a message on this topic that was seen in this way.
