@@ -374,12 +374,6 @@ impl<'a> Observation<'a> {
         value.filter(|value| value.is_object())
     }
 
-    /// A live state of the device under test, if it is an object.
-    #[must_use]
-    pub fn state_json(&self) -> Option<&'a Value> {
-        self.delivered_json(Topic::State)
-    }
-
     /// Whether this is a message towards the vehicle on that topic, from the harness or from a master control, readable or not.
     #[must_use]
     pub fn is_to_vehicle(&self, topic: Topic) -> bool {
