@@ -5,11 +5,11 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use crate::finding::{broken, remark, says_broken};
+use crate::finding::{broken, remark};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::{Event, Packet};
-use tck_world::members::text;
+use tck_view::ConnectionView;
 use tck_world::{End, Listen, Observation, Topic};
 
 const CONNECTIONS: usize = 32;
@@ -25,7 +25,7 @@ pub(super) const ONLINE_AFTER_CONNECT: Check = Check {
     arguments: &[],
     listens: &[Listen::Everything],
     reads: &[],
-    needs: &[],
+    needs: &[ConnectionView::connection_state],
     start: |_| Box::new(OnlineAfterConnect::default()),
 };
 
@@ -37,7 +37,7 @@ pub(super) const VALUES: Check = Check {
     arguments: &[],
     listens: &[Listen::Published(Topic::Connection)],
     reads: &[],
-    needs: &[],
+    needs: &[ConnectionView::connection_state],
     start: |_| Box::new(Values),
 };
 
@@ -125,12 +125,8 @@ impl OnlineAfterConnect {
         else {
             return false;
         };
-        match message.name {
-            "connection"
-                if record
-                    .json()
-                    .is_some_and(|value| text(value, "connectionState") == "ONLINE") =>
-            {
+        match message.topic {
+            Topic::Connection if record.connection_message().is_some_and(|message| message.is_online()) => {
                 if session.first_state.is_some() && !session.online && !session.late {
                     let words = "ONLINE is published after the first state of the connection";
                     findings.push(remark("CONN-05", record.seq(), words));
@@ -139,7 +135,7 @@ impl OnlineAfterConnect {
                 self.online_before = true;
                 true
             }
-            "state" if !session.online && !announced => {
+            Topic::State if !session.online && !announced => {
                 session.first_state.get_or_insert((record.at().moment, record.seq()));
                 false
             }
@@ -178,13 +174,15 @@ impl OnlineAfterConnect {
         let Some(message) = record.delivered() else {
             return;
         };
-        match message.name {
-            "connection" => {
-                let Some(value) = record.json() else { return };
-                let said = match text(value, "connectionState") {
-                    "OFFLINE" => Some("OFFLINE"),
-                    _ if says_broken(value) => Some("CONNECTIONBROKEN"),
-                    _ => None,
+        match message.topic {
+            Topic::Connection => {
+                let Some(message) = record.connection_message() else {
+                    return;
+                };
+                let said = if message.is_offline() {
+                    Some("OFFLINE")
+                } else {
+                    message.is_broken().then_some("CONNECTIONBROKEN")
                 };
                 self.stale = said.map(|said| Stale {
                     since: None,
@@ -192,7 +190,7 @@ impl OnlineAfterConnect {
                     reported: false,
                 });
             }
-            "state" if !record.link.disturbed => {
+            Topic::State if !record.link.disturbed => {
                 let limit = Self::limit(context);
                 let Some(stale) = self.stale.as_mut().filter(|stale| !stale.reported) else {
                     return;
@@ -232,7 +230,7 @@ impl Running for OnlineAfterConnect {
         let judged = self.packets(record, context, findings);
         self.overdue(&record.now(), context, findings);
         self.delivered(record, context, findings);
-        judged || record.delivered().is_some_and(|message| message.name == "connection")
+        judged || record.is_delivered(Topic::Connection)
     }
 
     fn finish(&mut self, end: &End, context: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) {
@@ -245,10 +243,10 @@ struct Values;
 impl Running for Values {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         let published = record.published();
-        if !record.link.tap || published.is_none_or(|message| message.name != "connection") {
+        if !record.link.tap || published.is_none_or(|message| message.topic != Topic::Connection) {
             return false;
         }
-        if record.json().is_some_and(says_broken) {
+        if record.connection_message().is_some_and(|message| message.is_broken()) {
             findings.push(remark(
                 "CONN-10",
                 record.seq(),

@@ -9,7 +9,7 @@ use crate::finding::{broken, remark};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::{Close, Event, Packet};
-use tck_world::members::{elements, text};
+use tck_view::StateView;
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// A connection that ends within this time of a message ends right behind it.
@@ -41,7 +41,7 @@ pub(super) const STAYS: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Malformed],
-    needs: &[],
+    needs: &[StateView::order_id, StateView::action_states],
     start: |_| Box::new(Stays::default()),
 };
 
@@ -84,14 +84,13 @@ impl Stays {
             return;
         };
         let ids = record
-            .to_vehicle_json(Topic::Order)
-            .map(|order| vec![text(order, "orderId").to_owned()])
-            .unwrap_or_default();
-        let actions = record.to_vehicle_json(Topic::InstantActions).into_iter();
-        let actions = actions.flat_map(|message| elements(message, "actions").take(50));
+            .order_to_vehicle()
+            .map(|order| order.order_id.or_empty().to_owned());
+        let actions = record.instant_actions_to_vehicle().into_iter();
+        let actions = actions.flat_map(|message| message.actions.iter().take(50));
         let ids = ids
             .into_iter()
-            .chain(actions.map(|action| text(action, "actionId").to_owned()));
+            .chain(actions.map(|action| action.action_id.or_empty().to_owned()));
         self.sent = Some(Sent {
             seq: record.seq(),
             at: record.at().moment,
@@ -171,11 +170,12 @@ impl Running for Stays {
             }
             _ => {}
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
         let named = |id: &str| {
-            id == text(state, "orderId") || elements(state, "actionStates").any(|action| text(action, "actionId") == id)
+            let mut actions = state.all_action_states();
+            id == state.order_id.or_empty() || actions.any(|action| action.action_id.or_empty() == id)
         };
         let answered = self
             .sent

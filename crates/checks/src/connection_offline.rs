@@ -7,7 +7,7 @@ use crate::finding::broken;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::{Direction, Event, Packet};
-use tck_world::members::text;
+use tck_view::ConnectionView;
 use tck_world::{Listen, Observation, Topic};
 
 /// How many connections are kept in mind.
@@ -31,7 +31,7 @@ pub(super) const SAYS_OFFLINE: Check = Check {
         Listen::Published(Topic::Connection),
     ],
     reads: &[],
-    needs: &[],
+    needs: &[ConnectionView::connection_state],
     start: |_| Box::new(SaysOffline::default()),
 };
 
@@ -56,15 +56,16 @@ impl SaysOffline {
     fn goes_on(&mut self, connection: u64, record: &Observation<'_>) -> bool {
         let now = record.at().moment;
         let is_state = record.topic() == Some(Topic::State);
-        let said = |what: &str| record.topic() == Some(Topic::Connection) && says(record, what);
+        let said = record.connection_message();
+        let says_online = said.is_some_and(|message| message.is_online());
         let mut found = false;
         if let Some(gone) = self.gone.get_mut(&connection) {
             gone.goes_on |= is_state;
             let long = is_state && now.since(gone.since) > LAST_WORDS;
-            found = (long || said("ONLINE") && gone.goes_on) && !gone.told;
+            found = (long || says_online && gone.goes_on) && !gone.told;
             gone.told |= found;
         }
-        if said("OFFLINE") {
+        if said.is_some_and(|message| message.is_offline()) {
             if self.gone.len() >= CONNECTIONS {
                 self.gone.pop_first();
             }
@@ -73,17 +74,11 @@ impl SaysOffline {
                 goes_on: false,
                 told: false,
             });
-        } else if said("ONLINE") {
+        } else if says_online {
             self.gone.remove(&connection);
         }
         found && !record.link.disturbed
     }
-}
-
-fn says(record: &Observation<'_>, what: &str) -> bool {
-    record
-        .json()
-        .is_some_and(|message| text(message, "connectionState") == what)
 }
 
 impl Running for SaysOffline {
@@ -96,12 +91,13 @@ impl Running for SaysOffline {
             findings.push(broken("CONN-08", record.seq(), text));
         }
         if let Some(publish) = publish.filter(|_| record.topic() == Some(Topic::Connection)) {
-            let said = says(record, "ONLINE");
+            let said = record.connection_message();
             if self.online.len() >= CONNECTIONS {
                 self.online.pop_first();
             }
-            self.online.insert(publish.connection, said);
-            return says(record, "OFFLINE");
+            let says_online = said.is_some_and(|message| message.is_online());
+            self.online.insert(publish.connection, says_online);
+            return said.is_some_and(|message| message.is_offline());
         }
         if record.entry.record.direction == Some(Direction::ToDevice) {
             return false;

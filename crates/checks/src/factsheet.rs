@@ -9,7 +9,9 @@ use serde_json::Value;
 
 use crate::finding::{broken, quote, remark, show};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, text};
+use tck_view::{
+    Envelope2d, FactsheetView, Field, LoadSet, Member, Number, PhysicalParameters, Point as Corner, ProtocolLimits,
+};
 use tck_world::{Listen, Observation, Topic};
 
 /// `factsheet/limits`.
@@ -21,7 +23,7 @@ pub(super) const LIMITS: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Factsheet)],
     reads: &[],
-    needs: &[],
+    needs: &[ProtocolLimits::max_string_lens, ProtocolLimits::max_array_lens],
     start: |_| Box::new(Limits),
 };
 
@@ -37,7 +39,11 @@ pub(super) const CONSISTENCY: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Factsheet)],
     reads: &[],
-    needs: &[],
+    needs: &[
+        LoadSet::set_name,
+        Envelope2d::polygon_points,
+        FactsheetView::physical_parameters,
+    ],
     start: |_| Box::new(Consistency),
 };
 
@@ -45,22 +51,14 @@ struct Consistency;
 
 impl Running for Consistency {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let message = record.delivered();
-        if message.is_none_or(|message| message.name != "factsheet") {
-            return false;
-        }
-        let Some(factsheet) = record.json().filter(|value| value.is_object()) else {
+        let Some(factsheet) = record.factsheet() else {
             return false;
         };
         let seq = record.seq();
         let mut names = BTreeSet::new();
-        for set in factsheet
-            .get("loadSpecification")
-            .into_iter()
-            .flat_map(|loads| elements(loads, "loadSets"))
-            .take(ELEMENTS)
-        {
-            let name = text(set, "setName");
+        let loads = factsheet.load_specification.there().into_iter();
+        for set in loads.flat_map(|loads| loads.load_sets.iter()).take(ELEMENTS) {
+            let name = set.set_name.or_empty();
             if !names.insert(name) {
                 findings.push(broken(
                     "FACT-09",
@@ -69,36 +67,52 @@ impl Running for Consistency {
                 ));
             }
         }
-        let geometry = factsheet.get("agvGeometry");
+        let geometry = factsheet.geometry.there().into_iter();
         for envelope in geometry
-            .into_iter()
-            .flat_map(|geometry| elements(geometry, "envelopes2d"))
+            .flat_map(|geometry| geometry.envelopes_2d.iter())
             .take(ELEMENTS)
         {
-            let point = |point: &Value| Some((point.get("x")?.as_f64()?, point.get("y")?.as_f64()?));
-            let points: Option<Vec<_>> = elements(envelope, "polygonPoints").take(ELEMENTS).map(point).collect();
+            let point = |corner: &Corner| Some((corner.x.float()?, corner.y.float()?));
+            let points: Option<Vec<_>> = envelope.polygon_points.iter().take(ELEMENTS).map(point).collect();
             if points.is_some_and(|points| crosses_itself(&points)) {
-                let text = format!(
-                    "the polygon of envelope {} crosses itself",
-                    quote(text(envelope, "set"))
-                );
+                let name = quote(envelope.set.or_empty());
+                let text = format!("the polygon of envelope {name} crosses itself");
                 findings.push(broken("FACT-08", seq, text));
             }
         }
-        let physical = |name: &str| factsheet.get("physicalParameters")?.get(name)?.as_f64();
-        for (least, most) in [
-            ("speedMin", "speedMax"),
-            ("heightMin", "heightMax"),
-            ("angularSpeedMin", "angularSpeedMax"),
-        ] {
-            if let (Some(low), Some(high)) = (physical(least), physical(most))
+        let physical = factsheet.physical_parameters.there();
+        for [(least, low), (most, high)] in physical.into_iter().flat_map(ranges) {
+            if let (Some(low), Some(high)) = (low.float(), high.float())
                 && low > high
             {
-                findings.push(remark("FACT-04", seq, format!("{least} {low} is above {most} {high}")));
+                let name = |field| record.names().name(field).unwrap_or_default();
+                let text = format!("{} {low} is above {} {high}", name(least), name(most));
+                findings.push(remark("FACT-04", seq, text));
             }
         }
         true
     }
+}
+
+/// A limit of the vehicle: the member, and what stands there.
+type Bound<'v> = (Field, &'v Member<Number>);
+
+/// The limits of the vehicle that go from a minimum to a maximum.
+fn ranges(physical: &PhysicalParameters) -> [[Bound<'_>; 2]; 3] {
+    [
+        [
+            (PhysicalParameters::speed_min, &physical.speed_min),
+            (PhysicalParameters::speed_max, &physical.speed_max),
+        ],
+        [
+            (PhysicalParameters::height_min, &physical.height_min),
+            (PhysicalParameters::height_max, &physical.height_max),
+        ],
+        [
+            (PhysicalParameters::angular_speed_min, &physical.angular_speed_min),
+            (PhysicalParameters::angular_speed_max, &physical.angular_speed_max),
+        ],
+    ]
 }
 
 /// What the literal names with a dot begin with.
@@ -122,15 +136,15 @@ struct Limits;
 
 impl Running for Limits {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let message = record.delivered();
-        if message.is_none_or(|message| message.name != "factsheet") {
-            return false;
-        }
-        let limits = record.json().and_then(|sheet| sheet.get("protocolLimits"));
+        let sheet = record.json().filter(|_| record.is_delivered(Topic::Factsheet));
+        let Some(sheet) = sheet else { return false };
         let mut judged = false;
-        for name in ["maxStringLens", "maxArrayLens"] {
-            let members = limits.and_then(|limits| limits.get(name)?.as_object());
-            for (key, value) in members.into_iter().flatten().take(ELEMENTS) {
+        for list in [ProtocolLimits::max_string_lens, ProtocolLimits::max_array_lens] {
+            // Members that no version knows are looked for, too.
+            let members = record.names().raw(sheet, &[FactsheetView::protocol_limits, list]);
+            let name = record.names().name(list).unwrap_or_default();
+            let members = members.and_then(Value::as_object).into_iter().flatten();
+            for (key, value) in members.take(ELEMENTS) {
                 judged = true;
                 // A manufacturer may add members of any kind.
                 if (value.is_object() || value.is_array()) && FIRST_PARTS.contains(&key.as_str()) {

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, text};
+use tck_view::{OfferedAction, ProtocolFeatures};
 use tck_world::{Listen, Observation, Topic};
 
 /// How many elements of a list are looked at.
@@ -22,7 +22,7 @@ pub(super) const PREDEFINED: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Factsheet)],
     reads: &[],
-    needs: &[],
+    needs: &[ProtocolFeatures::actions, OfferedAction::action_parameters],
     start: |_| Box::new(Predefined),
 };
 
@@ -35,17 +35,15 @@ impl Running for Predefined {
         context: &CheckContext<'_>,
         findings: &mut Vec<CheckFinding>,
     ) -> bool {
-        let message = record.delivered();
-        if message.is_none_or(|message| message.name != "factsheet") {
-            return false;
-        }
-        let features = record.json().and_then(|factsheet| factsheet.get("protocolFeatures"));
+        let factsheet = record
+            .factsheet()
+            .filter(|factsheet| !factsheet.protocol_features.is_absent());
         let predefined = context.pack.vocabulary().get("action").and_then(Value::as_object);
-        let (Some(features), Some(predefined)) = (features, predefined) else {
+        let (Some(factsheet), Some(predefined)) = (factsheet, predefined) else {
             return false;
         };
-        let listed: Vec<&Value> = elements(features, "agvActions").take(ELEMENTS).collect();
-        let names: Vec<&str> = listed.iter().map(|action| text(action, "actionType")).collect();
+        let listed: Vec<&OfferedAction> = factsheet.offered_actions().take(ELEMENTS).collect();
+        let names: Vec<&str> = listed.iter().map(|action| action.action_type.or_empty()).collect();
         let known: Vec<&str> = predefined.keys().map(String::as_str).collect();
         let mut add = |requirement, whose: &str, odd: &Odd<'_>| {
             let name = quote(odd.name);
@@ -64,14 +62,12 @@ impl Running for Predefined {
         };
         look(&names, &known).for_each(|odd| add("ACT-05", "", &odd));
         for action in listed {
-            let kind = text(action, "actionType");
+            let kind = action.action_type.or_empty();
             let parameters = predefined
                 .get(kind)
                 .and_then(|known| known.get("parameters")?.as_object());
-            let keys: Vec<&str> = elements(action, "actionParameters")
-                .take(ELEMENTS)
-                .map(|parameter| text(parameter, "key"))
-                .collect();
+            let offered = action.action_parameters.iter().take(ELEMENTS);
+            let keys: Vec<&str> = offered.map(|parameter| parameter.key.or_empty()).collect();
             // Further parameters are allowed beside those of the text.
             let known: Vec<&str> = parameters
                 .into_iter()

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use crate::finding::{broken, show};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::event::{Event, Packet};
+use tck_view::{FactsheetView, VehicleConfig};
 use tck_world::{Listen, Observation, Topic};
 
 /// See the module.
@@ -23,7 +23,7 @@ pub(super) const NETWORK: Check = Check {
         Listen::Published(Topic::Factsheet),
     ],
     reads: &[],
-    needs: &[],
+    needs: &[VehicleConfig::network],
     start: |_| Box::new(Network::default()),
 };
 
@@ -34,24 +34,17 @@ struct Network {
 
 impl Running for Network {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let connects = matches!(
-            record.event(),
-            Event::Packet {
-                packet: Packet::Connect { .. },
-                ..
-            }
-        );
-        let anew = connects || !record.link.tap && record.may_be_a_restart();
+        let anew = record.connects() || !record.link.tap && record.may_be_a_restart();
         if anew || record.outside_influence() {
             self.said = None;
         }
         let message = record.published();
-        if message.is_none_or(|message| message.name != "factsheet") {
+        if message.is_none_or(|message| message.topic != Topic::Factsheet) {
             return false;
         }
-        let Some(network) = record.json().and_then(|sheet| sheet.pointer("/vehicleConfig/network")) else {
-            return false;
-        };
+        let path = [FactsheetView::vehicle_config, VehicleConfig::network];
+        let network = record.json().and_then(|sheet| record.names().raw(sheet, &path));
+        let Some(network) = network else { return false };
         let before = self.said.replace(network.clone());
         if let Some(before) = before.as_ref().filter(|before| *before != network) {
             let text = format!("the network data were {}, and are {} now", show(before), show(network));

@@ -6,19 +6,6 @@ use tck_base::verdict::Verdict;
 use tck_check::CheckFinding;
 use tck_pack::RequirementId;
 use tck_view::{Member, Shown};
-use tck_world::members::text;
-
-/// The header fields of every message.
-pub(crate) const HEADER: [&str; 5] = ["headerId", "timestamp", "version", "manufacturer", "serialNumber"];
-
-/// Whether a connection message says that the connection is broken. Spelled with or without underscore
-/// depending on the version.
-pub(crate) fn says_broken(message: &serde_json::Value) -> bool {
-    text(message, "connectionState")
-        .bytes()
-        .filter(|byte| *byte != b'_')
-        .eq(b"CONNECTIONBROKEN".iter().copied())
-}
 
 /// A finding on `requirement` that follows its mood.
 pub(crate) fn broken(requirement: &str, seq: u64, message: impl Into<String>) -> CheckFinding {

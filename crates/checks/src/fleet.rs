@@ -4,7 +4,7 @@ use crate::finding::remark;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::Event;
-use tck_world::{End, Listen, Observation};
+use tck_world::{End, Listen, Observation, Topic};
 
 /// `fleet/commanded`.
 pub(super) const COMMANDED: Check = Check {
@@ -66,7 +66,7 @@ impl Running for Commanded {
                 self.asked = Some((now + context.time.react, record.seq()));
             }
         }
-        let ordered = record.delivered().is_some_and(|message| message.name == "order");
+        let ordered = record.is_delivered(Topic::Order);
         if ordered {
             self.came = true;
             judged |= self.asked.take().is_some();

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use crate::finding::{broken, quote};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::Event;
-use tck_world::members::{elements, number, text};
+use tck_view::OrderView;
 use tck_world::{Listen, Observation, Topic};
 
 /// See the module.
@@ -17,7 +17,7 @@ pub(super) const OWN_ORDERS: Check = Check {
     arguments: &[],
     listens: &[Listen::Begin, Listen::Delivered(Topic::Order)],
     reads: &[],
-    needs: &[],
+    needs: &[OrderView::order_id, OrderView::order_update_id],
     start: |_| Box::new(OwnOrders::default()),
 };
 
@@ -43,16 +43,13 @@ impl Running for OwnOrders {
             self.place =
                 all.position(|one| (one.manufacturer.as_str(), one.serial_number.as_str()) == context.identity);
         }
-        let message = record.delivered();
-        let order = message.filter(|message| message.name == "order").and(record.json());
-        let Some((order, place)) = order.filter(|_| !record.link.disturbed).zip(self.place) else {
+        let order = record.order().filter(|_| !record.link.disturbed);
+        let Some((order, place)) = order.zip(self.place) else {
             return false;
         };
-        let id = text(order, "orderId");
-        let first = elements(order, "nodes")
-            .filter_map(|node| number(node, "sequenceId"))
-            .min();
-        let goes_on = number(order, "orderUpdateId") > Some(0) && first > Some(0);
+        let id = order.order_id.or_empty();
+        let first = order.nodes.iter().filter_map(|node| node.sequence_id.whole()).min();
+        let goes_on = order.order_update_id.whole() > Some(0) && first > Some(0);
         let known = self.own.contains(id);
         let owner = context.world.fleet().borrow().owner(id);
         if goes_on && !known && owner.is_some_and(|owner| owner != place) {

@@ -8,11 +8,11 @@ use std::time::Duration;
 
 use regex::Regex;
 
-use crate::finding::{broken, quote, remark, says_broken, show};
+use crate::finding::{broken, quote, remark, show};
 use tck_base::clock::Moment;
-use tck_base::pattern::whole;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_pack::Role;
+use tck_view::Header;
 use tck_world::{Listen, Observation};
 
 /// How far the clock of a device may be off before it is remarked on.
@@ -35,7 +35,7 @@ pub(super) const TIMESTAMP: Check = Check {
     arguments: &[],
     listens: &[Listen::AnyDelivered],
     reads: &[],
-    needs: &[],
+    needs: &[Header::timestamp],
     start: |_| Box::new(Timestamp::default()),
 };
 
@@ -49,7 +49,7 @@ pub(super) const IDENTITY: Check = Check {
     arguments: &[],
     listens: &[Listen::AnyDelivered],
     reads: &[],
-    needs: &[],
+    needs: &[Header::manufacturer, Header::serial_number],
     start: |_| Box::new(Identity::default()),
 };
 
@@ -62,7 +62,7 @@ pub(super) const VERSION: Check = Check {
     arguments: &[],
     listens: &[Listen::AnyDelivered],
     reads: &[],
-    needs: &[],
+    needs: &[Header::version],
     start: |_| Box::new(Version),
 };
 
@@ -125,12 +125,11 @@ impl Running for Timestamp {
         let Some(message) = record.delivered() else {
             return false;
         };
-        let Some(value) = record.json() else { return false };
-        let Some(written) = value.get("timestamp") else {
-            return false;
-        };
-        let Some(written) = written.as_str() else {
-            let text = format!("timestamp {} on {} is no time in UTC", show(written), message.name);
+        let header = record.header().filter(|header| !header.timestamp.is_absent());
+        let Some(header) = header else { return false };
+        let Some(written) = header.timestamp.text() else {
+            let shown = show(&header.timestamp);
+            let text = format!("timestamp {shown} on {} is no time in UTC", message.name);
             findings.push(broken("HDR-03", record.seq(), text));
             return true;
         };
@@ -147,11 +146,10 @@ impl Running for Timestamp {
         }
         let apart = time.duration_since(record.at().utc).unsigned_abs();
         // The broker sends the will long after it was written.
-        let will = message.name == "connection" && says_broken(value);
-        if will {
+        if record.connection_message().is_some_and(|message| message.is_broken()) {
             return true;
         }
-        let id = value.get("headerId").and_then(whole);
+        let id = header.header_id.whole();
         if self.stands_still(message.name, written, id, record.at().moment) {
             let text = format!("timestamp {} stands still on {}", quote(written), message.name);
             findings.push(broken("HDR-03", record.seq(), text));
@@ -189,8 +187,10 @@ impl Running for Identity {
         let Some(message) = record.delivered() else {
             return false;
         };
-        let field = |name| record.json()?.get(name)?.as_str();
-        let (Some(manufacturer), Some(serial)) = (field("manufacturer"), field("serialNumber")) else {
+        let named = record
+            .header()
+            .and_then(|header| header.manufacturer.text().zip(header.serial_number.text()));
+        let Some((manufacturer, serial)) = named else {
             return false;
         };
         let seq = record.seq();
@@ -267,7 +267,7 @@ impl Running for Version {
         let Some(message) = record.delivered() else {
             return false;
         };
-        let Some(written) = record.json().and_then(|value| value.get("version")?.as_str()) else {
+        let Some(written) = record.header().and_then(|header| header.version.text()) else {
             return false;
         };
         let parts: Vec<Option<u64>> = written

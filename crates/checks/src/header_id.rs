@@ -4,13 +4,12 @@
 
 use std::collections::BTreeMap;
 
-use serde_json::Value;
-
-use crate::finding::{broken, remark, says_broken, show, unclear};
+use crate::finding::{broken, remark, show, unclear};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::{Event, Packet};
 use tck_pack::Role;
-use tck_world::{Listen, Observation};
+use tck_view::{Header, Member, Number};
+use tck_world::{Listen, Observation, Topic};
 
 /// See the module.
 pub(super) const ID_RISES: Check = Check {
@@ -31,7 +30,7 @@ pub(super) const ID_RISES: Check = Check {
         Listen::AnyPublished,
     ],
     reads: &[],
-    needs: &[],
+    needs: &[Header::header_id],
     start: |_| Box::new(IdRises::default()),
 };
 
@@ -80,18 +79,18 @@ impl Running for IdRises {
         if record.link.disturbed {
             return false;
         }
-        let Some(value) = record.json().filter(|value| value.is_object()) else {
+        let Some(said) = record.message().filter(|said| said.is_object()) else {
             self.last.remove(message.name);
             return false;
         };
-        if !record.link.tap && message.name == "connection" {
+        if !record.link.tap && message.topic == Topic::Connection {
             // Either the will, or the sign of a new connection: the count may begin anew on every topic.
-            if says_broken(value) {
+            if said.connection().is_some_and(|said| said.is_broken()) {
                 return false;
             }
             self.last.clear();
         }
-        let Some(id) = Self::read(value.get("headerId"), message.name, record, findings) else {
+        let Some(id) = Self::read(&said.header().header_id, message.name, record, findings) else {
             self.last.remove(message.name);
             return true;
         };
@@ -134,18 +133,22 @@ impl Running for IdRises {
 
 impl IdRises {
     fn read(
-        id: Option<&Value>,
+        id: &Member<Number>,
         topic: &str,
         record: &Observation<'_>,
         findings: &mut Vec<CheckFinding>,
     ) -> Option<u32> {
         // A missing headerId is another requirement's business.
-        let id = id?;
-        if let Some(id) = id.as_u64().and_then(|id| u32::try_from(id).ok()) {
+        if id.is_absent() {
+            return None;
+        }
+        if let Some(Number::Whole(id)) = id.number()
+            && let Ok(id) = u32::try_from(id)
+        {
             return Some(id);
         }
         let whole = id
-            .as_f64()
+            .float()
             .filter(|number| number.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(number));
         if let Some(whole) = whole {
             let text = format!("headerId {} on {topic} is written as a fraction", show(id));

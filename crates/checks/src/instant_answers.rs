@@ -33,7 +33,7 @@ pub(super) const ANSWERED: Check = Check {
         Listen::Delivered(Topic::Factsheet),
         Listen::Delivered(Topic::State),
     ],
-    reads: &[Fact::Restarts],
+    reads: &[Fact::Restarts, Fact::Instant],
     needs: &[StateView::action_states],
     start: |_| Box::new(Answered::looking_for("IACT-03")),
 };
@@ -55,7 +55,7 @@ pub(super) const TOGETHER: Check = Check {
         Listen::Delivered(Topic::Factsheet),
         Listen::Delivered(Topic::State),
     ],
-    reads: &[Fact::Restarts],
+    reads: &[Fact::Restarts, Fact::Instant],
     needs: &[StateView::action_states],
     start: |_| Box::new(Answered::looking_for("IACT-07")),
 };
@@ -78,7 +78,7 @@ pub(super) const BEGINS: Check = Check {
         Listen::Delivered(Topic::Factsheet),
         Listen::Delivered(Topic::State),
     ],
-    reads: &[Fact::Restarts],
+    reads: &[Fact::Restarts, Fact::Instant],
     needs: &[StateView::action_states],
     start: |_| Box::new(Answered::looking_for("IACT-05")),
 };
@@ -100,7 +100,7 @@ pub(super) const SCOPE: Check = Check {
         Listen::Delivered(Topic::Factsheet),
         Listen::Delivered(Topic::State),
     ],
-    reads: &[Fact::Restarts],
+    reads: &[Fact::Restarts, Fact::Instant],
     needs: &[StateView::action_states],
     start: |_| Box::new(Answered::looking_for("ACT-10")),
 };
@@ -169,18 +169,16 @@ impl Answered {
                 .filter(|action| action.action_scopes.texts().any(|scope| scope == "INSTANT"));
             self.offered = instant.map(|action| action.action_type.or_empty().to_owned()).collect();
         }
-        let (Some(document), Some(message)) = (record.json(), record.instant_actions_to_vehicle()) else {
+        let Some(message) = context.world.instant().well_formed(record) else {
             return;
         };
-        let schema = context.pack.schema("instantActions");
-        let obeys = schema.is_none_or(|schema| schema.findings(document).is_empty());
         let all: Vec<&ActionView> = message.all_actions().collect();
         let id = |action: &ActionView| action.action_id.or_empty().to_owned();
         let fresh = |at: usize| {
             let own = id(all[at]);
             !own.is_empty() && !self.asked.contains_key(&own) && all[..at].iter().all(|other| id(other) != own)
         };
-        if !obeys || record.link.disturbed || all.len() > IN_ONE || !(0..all.len()).all(fresh) {
+        if record.link.disturbed || all.len() > IN_ONE || !(0..all.len()).all(fresh) {
             return;
         }
         if self.asked.len() > ACTIONS {

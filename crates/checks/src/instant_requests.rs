@@ -32,7 +32,7 @@ pub(super) const REQUESTS_MET: Check = Check {
         Listen::Stored(Topic::Factsheet),
         Listen::Delivered(Topic::State),
     ],
-    reads: &[Fact::Restarts],
+    reads: &[Fact::Restarts, Fact::Instant],
     needs: &[StateView::action_states],
     start: |_| Box::new(Requests::default()),
 };
@@ -47,14 +47,10 @@ struct Requests {
 
 impl Requests {
     fn learn(&mut self, record: &Observation<'_>, context: &CheckContext<'_>) {
-        let message = record.instant_actions_to_vehicle();
-        let (Some(document), Some(message)) = (record.json(), message.filter(|_| !record.link.disturbed)) else {
+        let message = context.world.instant().well_formed(record);
+        let Some(message) = message.filter(|_| !record.link.disturbed) else {
             return;
         };
-        let schema = context.pack.schema("instantActions");
-        if schema.is_some_and(|schema| !schema.findings(document).is_empty()) {
-            return;
-        }
         for action in message.all_actions().take(REQUESTS) {
             let id = action.action_id.or_empty().to_owned();
             match action.action_type.or_empty() {

@@ -7,12 +7,11 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::state::driving::Pose;
 use crate::finding::{broken, quote, show};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::Event;
-use tck_view::{ActionState, ActionView, Json, Member, Number, StateView};
+use tck_view::{ActionState, ActionView, Json, Member, Number, Pose, StateView, Text};
 use tck_world::{Fact, Listen, Observation, Topic, sets_position};
 
 /// How many actions are kept in mind.
@@ -256,15 +255,15 @@ impl Linked {
         let coordinate = |key: &str| action.parameter(key).and_then(Json::number).map(Number::float);
         let word = |key: &str| action.parameter(key).and_then(Json::text);
         let given = (coordinate("x"), coordinate("y"), coordinate("theta"), word("mapId"));
-        if let ((Some(x), Some(y), Some(theta), Some(map)), Some(shown)) = (given, Pose::of(&state.position)) {
+        if let ((Some(x), Some(y), Some(theta), Some(map)), Some(shown)) = (given, state.pose()) {
             let given = Pose {
-                map: map.to_owned(),
                 x,
                 y,
                 theta,
+                map_id: Text::from(map),
             };
             let (far, turned) = shown.apart(&given);
-            if shown.map != given.map || far > BESIDE.0 || turned > BESIDE.1 {
+            if shown.map_id != given.map_id || far > BESIDE.0 || turned > BESIDE.1 {
                 let names = record.names();
                 let message = record.json();
                 let position = message.and_then(|message| names.raw(message, &[StateView::position]));

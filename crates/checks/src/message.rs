@@ -11,6 +11,10 @@ use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::json::JsonProblem;
 use tck_pack::{Finding, FindingKind, Pack};
+use tck_view::{
+    ActionView, Edge, FactsheetView, Field, Header, InstantActionsView, Member, MessageView, Names, Node, OrderView,
+    PhysicalParameters, StateView, Topic, VisualizationView,
+};
 use tck_world::{Fact, Listen, Observation};
 
 /// `message/schema`.
@@ -82,22 +86,45 @@ pub(super) const ENCODING: Check = Check {
 struct Schema {
     /// The member names of each topic's messages.
     members: BTreeMap<String, Vec<String>>,
-    /// The same of what is inside of messages: topic and path.
-    inner: Vec<(&'static str, &'static [&'static str], Vec<String>)>,
+    /// What is inside of messages.
+    inner: Vec<Inner>,
+    /// What the version calls the members of [`OF_ORDER`].
+    of_order: Vec<String>,
     /// An angle beyond pi by what single precision does to it was remarked on.
     rounded: bool,
 }
 
+/// Objects inside of the messages of a topic, and the members they have.
+struct Inner {
+    topic: Topic,
+    /// The names on the way to them.
+    path: Vec<String>,
+    members: Vec<String>,
+}
+
+impl Inner {
+    /// `None` where the version has no such objects.
+    fn of(topic: Topic, path: &[Field], pack: &Pack) -> Option<Self> {
+        let names: Option<Vec<&str>> = path.iter().map(|field| pack.names().name(*field)).collect();
+        let names: Vec<&str> = names?.into_iter().flat_map(|name| name.split('/')).collect();
+        Some(Self {
+            topic,
+            members: pack.schema(topic.as_str())?.members(&names),
+            path: names.into_iter().map(str::to_owned).collect(),
+        })
+    }
+}
+
 /// Members of a state that repeat what an order said.
-const OF_ORDER: [&str; 8] = [
-    "orderId",
-    "orderUpdateId",
-    "nodeStates",
-    "edgeStates",
-    "actionStates",
-    "lastNodeId",
-    "lastNodeSequenceId",
-    "zoneSetId",
+const OF_ORDER: [Field; 8] = [
+    StateView::order_id,
+    StateView::order_update_id,
+    StateView::node_states,
+    StateView::edge_states,
+    StateView::action_states,
+    StateView::last_node_id,
+    StateView::last_node_sequence_id,
+    StateView::zone_set_id,
 ];
 
 /// Pi and what single precision, or seven digits, make of it.
@@ -122,10 +149,12 @@ impl Schema {
         let members = names.filter_map(|name| Some((name.clone(), context.pack.schema(name)?.members(&[]))));
         let inner = INNER
             .iter()
-            .filter_map(|(topic, path)| Some((*topic, *path, context.pack.schema(topic)?.members(path))));
+            .filter_map(|(topic, path)| Inner::of(*topic, path, context.pack));
+        let of_order = OF_ORDER.iter().filter_map(|field| context.pack.names().name(*field));
         Self {
             members: members.collect(),
             inner: inner.collect(),
+            of_order: of_order.map(str::to_owned).collect(),
             rounded: false,
         }
     }
@@ -135,9 +164,9 @@ impl Schema {
         if let Some(known) = self.members.get(topic) {
             odd_members(value, known, topic, seq, findings);
         }
-        for (_, path, known) in self.inner.iter().filter(|(of, ..)| *of == topic) {
+        for Inner { path, members, .. } in self.inner.iter().filter(|inner| inner.topic.as_str() == topic) {
             let mut inside = vec![value];
-            for name in *path {
+            for name in path {
                 inside = inside
                     .into_iter()
                     .flat_map(|value| inner(value, name))
@@ -146,32 +175,65 @@ impl Schema {
             }
             let before = findings.len();
             for value in inside {
-                odd_members(value, known, topic, seq, findings);
+                odd_members(value, members, topic, seq, findings);
             }
             // The same mistake is made everywhere; once is enough.
             findings.truncate(before + 1);
         }
     }
+
+    /// A member that is missing further inside, and stands there in another spelling.
+    fn deep_misspelling(
+        &self,
+        topic: &str,
+        finding: &Finding,
+        value: &Value,
+        seq: u64,
+        findings: &mut Vec<CheckFinding>,
+    ) {
+        let Some((inside, name)) = finding.path.rsplit_once('/').filter(|(inside, _)| !inside.is_empty()) else {
+            return;
+        };
+        let path: Vec<&str> = inside
+            .split('/')
+            .skip(1)
+            .filter(|part| part.parse::<u32>().is_err())
+            .collect();
+        // Those are looked through anyway.
+        let mut looked_through = self.inner.iter().filter(|inner| inner.topic.as_str() == topic);
+        if finding.kind != FindingKind::Missing || looked_through.any(|inner| inner.path == path) {
+            return;
+        }
+        let members = value.pointer(inside).and_then(Value::as_object);
+        let mut members = members.into_iter().flatten().map(|(member, _)| member);
+        if let Some(other) = members.find(|other| other.len() < 64 && plain(other) == plain(name)) {
+            let text = format!("member {} on {topic} is spelled {name:?}", quote(other));
+            findings.push(broken("JSON-01", seq, text));
+        }
+    }
 }
 
 /// What is inside of messages and has members of its own.
-const INNER: [(&str, &[&str]); 16] = [
-    ("state", &["safetyState"]),
-    ("state", &["batteryState"]),
-    ("state", &["agvPosition"]),
-    ("state", &["velocity"]),
-    ("state", &["errors"]),
-    ("visualization", &["agvPosition"]),
-    ("visualization", &["velocity"]),
-    ("order", &["nodes"]),
-    ("order", &["nodes", "nodePosition"]),
-    ("order", &["nodes", "actions"]),
-    ("order", &["nodes", "actions", "actionParameters"]),
-    ("order", &["edges"]),
-    ("order", &["edges", "actions"]),
-    ("order", &["edges", "corridor"]),
-    ("order", &["edges", "trajectory"]),
-    ("instantActions", &["actions"]),
+const INNER: [(Topic, &[Field]); 16] = [
+    (Topic::State, &[StateView::safety_state]),
+    (Topic::State, &[StateView::battery_state]),
+    (Topic::State, &[StateView::position]),
+    (Topic::State, &[StateView::velocity]),
+    (Topic::State, &[StateView::errors]),
+    (Topic::Visualization, &[VisualizationView::position]),
+    (Topic::Visualization, &[VisualizationView::velocity]),
+    (Topic::Order, &[OrderView::nodes]),
+    (Topic::Order, &[OrderView::nodes, Node::node_position]),
+    (Topic::Order, &[OrderView::nodes, Node::actions]),
+    (
+        Topic::Order,
+        &[OrderView::nodes, Node::actions, ActionView::action_parameters],
+    ),
+    (Topic::Order, &[OrderView::edges]),
+    (Topic::Order, &[OrderView::edges, Edge::actions]),
+    (Topic::Order, &[OrderView::edges, Edge::corridor]),
+    (Topic::Order, &[OrderView::edges, Edge::trajectory]),
+    (Topic::InstantActions, &[InstantActionsView::actions]),
 ];
 /// How many of them are looked at.
 const INSIDE: usize = 512;
@@ -222,7 +284,7 @@ impl Running for Schema {
         let of_order = topic == "state" && context.world.malformed().is_shown(record);
         for finding in schema.findings(value) {
             let first = finding.path.split('/').nth(1).unwrap_or_default();
-            if of_order && OF_ORDER.contains(&first) {
+            if of_order && self.of_order.iter().any(|name| name == first) {
                 continue;
             }
             if is_rounded_pi(&finding, value) {
@@ -236,44 +298,35 @@ impl Running for Schema {
             for id in requirements(context.pack, topic, &finding, value) {
                 findings.push(broken(id, seq, text.clone()));
             }
-            deep_misspelling(topic, &finding, value, seq, findings);
+            self.deep_misspelling(topic, &finding, value, seq, findings);
         }
         self.misspelled(topic, value, seq, findings);
-        let physical = value.get("physicalParameters").filter(|_| topic == "factsheet");
-        if physical.is_some_and(|physical| physical.get("heightMin").is_none()) {
-            let text = "factsheet/physicalParameters: `heightMin` is missing, which the document asks for";
-            findings.push(remark("FACT-04", seq, text));
-        }
+        let sheet = record.message().and_then(MessageView::factsheet);
+        findings.extend(sheet.and_then(|sheet| without_height(sheet, record.names(), seq)));
         true
     }
 }
 
-/// A member that is missing further inside, and stands there in another spelling.
-fn deep_misspelling(topic: &str, finding: &Finding, value: &Value, seq: u64, findings: &mut Vec<CheckFinding>) {
-    let Some((inside, name)) = finding.path.rsplit_once('/').filter(|(inside, _)| !inside.is_empty()) else {
-        return;
+/// The lowest height of a vehicle, which the document asks for and the schema does not.
+fn without_height(sheet: &FactsheetView, names: &Names, seq: u64) -> Option<CheckFinding> {
+    let has_height = |physical: &PhysicalParameters| !physical.height_min.is_absent();
+    let has_it = match &sheet.physical_parameters {
+        Member::Absent => true,
+        physical => physical.there().is_some_and(has_height),
     };
-    let path: Vec<&str> = inside
-        .split('/')
-        .skip(1)
-        .filter(|part| part.parse::<u32>().is_err())
-        .collect();
-    // Those are looked through anyway.
-    if finding.kind != FindingKind::Missing || INNER.contains(&(topic, &path[..])) {
-        return;
-    }
-    let members = value.pointer(inside).and_then(Value::as_object);
-    let mut members = members.into_iter().flatten().map(|(member, _)| member);
-    if let Some(other) = members.find(|other| other.len() < 64 && plain(other) == plain(name)) {
-        let text = format!("member {} on {topic} is spelled {name:?}", quote(other));
-        findings.push(broken("JSON-01", seq, text));
-    }
+    let (object, member) = (
+        names.name(FactsheetView::physical_parameters)?,
+        names.name(PhysicalParameters::height_min)?,
+    );
+    let text = format!("factsheet/{object}: `{member}` is missing, which the document asks for");
+    (!has_it).then(|| remark("FACT-04", seq, text))
 }
 
 /// Every requirement that a schema finding breaks; none for what another check judges by a milder ruling.
 fn requirements<'p>(pack: &'p Pack, topic: &str, finding: &Finding, value: &Value) -> Vec<&'p str> {
     let path: Vec<&str> = finding.path.split('/').skip(1).collect();
-    if finding.kind == FindingKind::Pattern && matches!(path[..], ["timestamp" | "version"]) {
+    let milder = [Header::timestamp, Header::version].map(|field| pack.names().name(field));
+    if finding.kind == FindingKind::Pattern && path.len() == 1 && milder.contains(&path.first().copied()) {
         return Vec::new();
     }
     let mut all = vec!["JSON-10"];

@@ -5,11 +5,10 @@
 use std::time::Duration;
 use tck_journal::event::Event;
 
-use super::state::driving::Pose;
 use crate::finding::broken;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_view::{Member, MessageView, Number, Position, StateView, Velocity};
+use tck_view::{Member, MessageView, Number, Pose, Position, StateView, Velocity};
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// Messages further apart may leave out a stop or a turn between them.
@@ -87,7 +86,7 @@ impl Seen {
         let sane = |member: &Member<Number>| member.float().filter(|number| number.abs() < 1e6);
         Some(Self {
             at,
-            pose: Pose::of(position)?,
+            pose: position.there()?.pose()?,
             vx: sane(&velocity.vx)?,
             vy: sane(&velocity.vy).unwrap_or_default(),
             omega: sane(&velocity.omega).unwrap_or_default(),
@@ -215,7 +214,7 @@ impl Running for Signs {
             _ => None,
         };
         if self.straight
-            && let Some(pose) = shown.and_then(|(position, _)| Pose::of(position))
+            && let Some(pose) = shown.and_then(|(position, _)| position.there()?.pose())
             && record.delivered().is_some()
         {
             self.forget_before_corner(&pose);
@@ -230,7 +229,7 @@ impl Running for Signs {
         let (Some(then), Some(now)) = (then, now) else {
             return false;
         };
-        if now.at.since(then.at) > CLOSE || now.pose.map != then.pose.map {
+        if now.at.since(then.at) > CLOSE || now.pose.map_id != then.pose.map_id {
             return false;
         }
         match (self.judge)(&then, &now) {

@@ -3,14 +3,14 @@
 //! What the messages say is left to the other checks.
 
 use std::collections::VecDeque;
-use tck_world::members::text;
 
-use crate::finding::{HEADER, broken, quote, remark, says_broken};
+use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::Parsed;
 use tck_journal::event::{Event, Packet, Will};
 use tck_pack::Role;
-use tck_world::{End, Listen, Observation};
+use tck_view::{ConnectionView, Field, Header, MessageView, Presence};
+use tck_world::{End, Listen, Observation, Topic};
 
 /// How many open connections of a device are kept in mind.
 const CONNECTIONS: usize = 32;
@@ -40,9 +40,18 @@ pub(super) const CONNECT: Check = Check {
     arguments: &[],
     listens: &[Listen::Connect, Listen::AnyPublished],
     reads: &[],
-    needs: &[],
+    needs: &[ConnectionView::connection_state],
     start: |_| Box::new(Connect::default()),
 };
+
+/// What the header of the last will has to have.
+const HEADER: [Field; 5] = [
+    Header::header_id,
+    Header::timestamp,
+    Header::version,
+    Header::manufacturer,
+    Header::serial_number,
+];
 
 struct Quality;
 
@@ -58,7 +67,9 @@ impl Running for Quality {
             ("order" | "instantActions", 1..) => findings.push(remark("MQTT-06", seq, text)),
             ("state" | "visualization" | "factsheet", 1..) => findings.push(remark("MQTT-07", seq, text)),
             // To a subscriber the will looks like any message; its QoS is judged in the CONNECT packet.
-            ("connection", 0) if record.link.tap || !record.json().is_some_and(says_broken) => {
+            ("connection", 0)
+                if record.link.tap || record.connection_message().is_none_or(|message| !message.is_broken()) =>
+            {
                 findings.push(broken("MQTT-08", seq, text));
             }
             ("connection", 2..) => findings.push(remark("MQTT-08", seq, text)),
@@ -93,6 +104,8 @@ struct Opened {
     level: u8,
     keep_alive: u16,
     will: Option<Will>,
+    /// The name of the topic on which the will is.
+    will_topic: Option<String>,
     /// Whether it published something else of the protocol.
     publishes: bool,
 }
@@ -128,6 +141,7 @@ impl Running for Connect {
                 level: *level,
                 keep_alive: *keep_alive,
                 will: will.clone(),
+                will_topic: record.will_topic_name().map(str::to_owned),
                 publishes: false,
             });
             return false;
@@ -145,7 +159,7 @@ impl Running for Connect {
         else {
             return false;
         };
-        if message.name != "connection" {
+        if message.topic != Topic::Connection {
             if let Some(opened) = self.open.get_mut(at) {
                 opened.publishes = true;
             }
@@ -189,7 +203,7 @@ impl Opened {
             findings.push(broken("CONN-01", seq, "the connection has no last will"));
             return;
         };
-        if context.topic_name(&will.topic) != Some("connection") {
+        if self.will_topic.as_deref() != Some(Topic::Connection.as_str()) {
             let text = format!(
                 "the last will is on {}, not on the connection topic",
                 quote(&will.topic)
@@ -200,16 +214,25 @@ impl Opened {
             let text = format!("the last will has QoS {} and RETAIN {}", will.qos, will.retain);
             findings.push(broken("CONN-03", seq, text));
         }
-        let parsed = Parsed::of(&will.payload);
-        let Some(value) = parsed.value().filter(|value| value.is_object()) else {
+        let (parsed, names) = (Parsed::of(&will.payload), context.pack.names());
+        let message = parsed
+            .value()
+            .map(|value| MessageView::of_value(Topic::Connection, value, names));
+        let message = message.filter(MessageView::is_object);
+        let Some(said) = message.as_ref().and_then(MessageView::connection) else {
             findings.push(broken("CONN-02", seq, "the last will is no connection message"));
             return;
         };
-        if !says_broken(value) {
-            let state = quote(text(value, "connectionState"));
+        if !said.is_broken() {
+            let state = quote(said.connection_state.or_empty());
             findings.push(broken("CONN-02", seq, format!("the last will says {state}")));
         }
-        let missing: Vec<&str> = HEADER.into_iter().filter(|name| value.get(*name).is_none()).collect();
+        let lacks = |field: &Field| said.header.presence(*field) == Presence::Absent;
+        let missing: Vec<&str> = HEADER
+            .into_iter()
+            .filter(lacks)
+            .filter_map(|field| names.name(field))
+            .collect();
         if !missing.is_empty() {
             let text = format!("the last will lacks {}", missing.join(", "));
             findings.push(broken("CONN-02", seq, text));

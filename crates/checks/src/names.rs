@@ -6,37 +6,6 @@ use std::path::{Path, PathBuf};
 
 use tck_view::Field;
 
-/// What still reads documents by name, as paths below `crates/`.
-const LEFT: &[&str] = &[
-    "checks/src/commands/",
-    "checks/src/connection.rs",
-    "checks/src/connection_crash.rs",
-    "checks/src/connection_offline.rs",
-    "checks/src/factsheet.rs",
-    "checks/src/factsheet_actions.rs",
-    "checks/src/factsheet_network.rs",
-    "checks/src/finding.rs",
-    "checks/src/fleet_orders.rs",
-    "checks/src/header.rs",
-    "checks/src/header_id.rs",
-    "checks/src/message.rs",
-    "checks/src/motion/corridor.rs",
-    "checks/src/mqtt.rs",
-    "checks/src/state/action_ids.rs",
-    "checks/src/state/period.rs",
-    "checks/src/topic.rs",
-    "checks/src/topic_heard.rs",
-    "checks/src/trajectory.rs",
-    "world/src/factsheets.rs",
-    "world/src/fleet.rs",
-    "world/src/lane.rs",
-    "world/src/members.rs",
-    "world/src/mock.rs",
-    "world/src/shown.rs",
-    "world/src/starts.rs",
-    "world/src/way.rs",
-];
-
 /// Every source of a folder, but those that only serve tests.
 fn sources(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
@@ -96,9 +65,6 @@ fn no_message_is_read_by_the_names_of_its_members() {
                 .expect("below crates/")
                 .to_string_lossy()
                 .replace('\\', "/");
-            if LEFT.iter().any(|left| name.starts_with(left)) {
-                continue;
-            }
             let source = fs::read_to_string(&path).expect("text");
             let named = looked_up(&source).into_iter().filter(|name| members.contains(name));
             wrong.extend(named.map(|member| format!("{name}: {member}")));

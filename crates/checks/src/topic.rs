@@ -5,15 +5,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use serde_json::Value;
-
 use super::header::serial_character;
 use crate::finding::{broken, quote, remark};
 use tck_base::clock::Moment;
-use tck_base::pattern::whole;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::event::{Event, Packet};
+use tck_journal::event::Event;
 use tck_pack::Role;
+use tck_view::{ConnectionView, FactsheetView, Field, Header, MessageView, StateView, Topic};
+use tck_world::ordered::short;
 use tck_world::{End, Listen, Observation};
 
 /// How many different topics are remembered; a device that invents more is judged on the first ones.
@@ -96,41 +95,46 @@ enum Sent {
 }
 
 impl Sent {
-    fn read(message: &Value) -> Option<Self> {
-        let short = |value: &Value| -> Option<String> { Some(value.as_str()?.chars().take(256).collect()) };
-        if message.get("nodes").is_some_and(Value::is_array) {
-            let update = message.get("orderUpdateId").and_then(whole)?;
-            return Some(Self::Order(short(message.get("orderId")?)?, update));
+    fn read(record: &Observation<'_>) -> Option<Self> {
+        let order = record.message_as(Topic::Order).and_then(MessageView::order)?;
+        if order.nodes.is_there() {
+            return Some(Self::Order(short(&order.order_id)?, order.order_update_id.whole()?));
         }
-        let action = message.get("actions")?.as_array()?.first()?;
-        let kind = action.get("actionType").is_some_and(Value::is_string);
-        Some(Self::Instant(short(action.get("actionId")?)?)).filter(|_| kind && message.get("headerId").is_some())
+        let message = record.message_as(Topic::InstantActions)?.instant_actions()?;
+        let action = message.actions.elements().first()?;
+        let is_told = action.action_type.is_there() && !message.header.header_id.is_absent();
+        Some(Self::Instant(short(&action.action_id)?)).filter(|_| is_told)
     }
 
     /// The topic where it belongs.
     fn topic(&self) -> &'static str {
         match self {
-            Self::Order(..) => "order",
-            Self::Instant(_) => "instantActions",
+            Self::Order(..) => Topic::Order.as_str(),
+            Self::Instant(_) => Topic::InstantActions.as_str(),
         }
     }
 }
 
 /// Members that tell a message of a vehicle wherever it is published.
-const LOOKS: [(&str, [&str; 2]); 3] = [
-    ("state", ["actionStates", "operatingMode"]),
-    ("factsheet", ["typeSpecification", "protocolLimits"]),
-    ("connection", ["connectionState", "headerId"]),
+const LOOKS: [(Topic, [Field; 2]); 3] = [
+    (Topic::State, [StateView::action_states, StateView::operating_mode]),
+    (
+        Topic::Factsheet,
+        [FactsheetView::type_specification, FactsheetView::protocol_limits],
+    ),
+    (Topic::Connection, [ConnectionView::connection_state, Header::header_id]),
 ];
 /// So long a device may publish elsewhere before it does on the topic of the name.
 const ELSEWHERE: Duration = Duration::from_secs(30);
 
-/// The name of the topic on which such a message belongs.
-pub(super) fn looks_like(message: &Value) -> Option<&'static str> {
+/// The topic on which such a message belongs.
+pub(super) fn looks_like(record: &Observation<'_>) -> Option<Topic> {
+    let (message, names) = (record.json()?, record.names());
+    let has = |member: Field| names.raw(message, &[member]).is_some();
     let mut looks = LOOKS.into_iter();
     looks
-        .find(|(_, members)| members.iter().all(|member| message.get(member).is_some()))
-        .map(|(name, _)| name)
+        .find(|(_, members)| members.iter().all(|member| has(*member)))
+        .map(|(topic, _)| topic)
 }
 
 /// A topic whose last level is spelled almost as that of the visualization, which has no members of its own to be told by.
@@ -157,7 +161,7 @@ impl Names {
             self.proper.insert(name.to_owned());
             return;
         }
-        let Some(name) = record.json().and_then(looks_like).or_else(|| almost(topic)) else {
+        let Some(name) = looks_like(record).map(Topic::as_str).or_else(|| almost(topic)) else {
             return;
         };
         let first = || (topic.to_owned(), record.seq(), record.at().moment, 0);
@@ -166,7 +170,7 @@ impl Names {
 
     /// Notes where a master control publishes its orders and instant actions.
     fn note_order(&mut self, topic: &str, record: &Observation<'_>, context: &CheckContext<'_>) {
-        let Some(key) = record.json().and_then(Sent::read) else {
+        let Some(key) = Sent::read(record) else {
             return;
         };
         let belongs = key.topic();
@@ -371,7 +375,7 @@ impl Structure {
             return false;
         };
         let own = (manufacturer, serial) == context.identity && context.topics.contains_key(name);
-        let spoken = record.json().and_then(|value| value.get("version")?.as_str());
+        let spoken = record.header().and_then(|header| header.version.text());
         let (Some(major), Some(spoken)) = (level.strip_prefix('v'), spoken.and_then(|text| text.split('.').next()))
         else {
             return false;
@@ -437,18 +441,13 @@ impl Running for OwnSide {
             Role::Agv => "master control",
             Role::MasterControl => "the vehicle",
         };
-        if let Event::Packet {
-            packet: Packet::Connect { will: Some(will), .. },
-            ..
-        } = record.event()
-        {
-            let name = context.topic_name(&will.topic);
-            let rule = name.and_then(|name| context.pack.topic(name));
-            if let Some(name) = name.filter(|_| rule.is_some_and(|rule| rule.publisher != context.role)) {
+        if let Some(name) = record.will_topic_name() {
+            let rule = context.pack.topic(name);
+            if rule.is_some_and(|rule| rule.publisher != context.role) {
                 let text = format!("the device has a last will on {name}, which belongs to {owner}");
                 findings.push(broken("TOPIC-15", record.seq(), text));
             }
-            return name.is_some();
+            return true;
         }
         let Some(name) = record.device_publish().and(record.topic_name()) else {
             return false;

@@ -6,14 +6,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use serde_json::Value;
-
 use crate::finding::broken;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::{Direction, Event, Packet};
-use tck_world::members::{actions, elements, text};
-use tck_world::{End, Listen, Observation, Topic};
+use tck_view::{Member, OrderView, StateView, Text};
+use tck_world::{End, Listen, Observation, Seen, takes};
 
 /// The topics a vehicle has to listen to.
 const TOPICS: [&str; 2] = ["order", "instantActions"];
@@ -33,7 +31,7 @@ pub(super) const HEARD: Check = Check {
     arguments: &[],
     listens: &[Listen::Everything],
     reads: &[],
-    needs: &[],
+    needs: &[OrderView::order_id, StateView::order_id, StateView::action_states],
     start: |_| Box::new(Heard::default()),
 };
 
@@ -75,7 +73,7 @@ impl Heard {
                     let Some(topic) = context.topics.get(name) else {
                         continue;
                     };
-                    if filters.iter().any(|filter| covers(&filter.filter, topic)) {
+                    if filters.iter().any(|filter| takes(&filter.filter, topic)) {
                         let opened = (record.at().moment, BTreeSet::new());
                         self.open.entry(*connection).or_insert(opened).1.insert(name);
                         self.arrived.insert(name);
@@ -83,8 +81,8 @@ impl Heard {
                     }
                 }
             }
-            Packet::Publish { topic, .. } if down => {
-                if let Some(name) = TOPICS.into_iter().find(|name| context.topics.get(*name) == Some(topic)) {
+            Packet::Publish { .. } if down => {
+                if let Some(name) = TOPICS.into_iter().find(|name| record.topic_name() == Some(*name)) {
                     self.arrived.insert(name);
                     self.pending.remove(name);
                 }
@@ -95,26 +93,26 @@ impl Heard {
 
     /// Notes what the harness sends while the vehicle is there and has had the time to subscribe.
     fn sent(&mut self, record: &Observation<'_>, context: &CheckContext<'_>) {
-        for name in TOPICS {
-            let Some(message) = record.to_vehicle_json(Topic::of_name(name)) else {
-                continue;
-            };
-            let mut keep = |id: &str| {
-                if !id.is_empty() && id.len() <= 512 {
-                    self.sent.push((name, id.to_owned()));
-                }
-            };
-            keep(text(message, "orderId"));
-            actions(message)
-                .take(KEPT)
-                .for_each(|action| keep(text(action, "actionId")));
-            let excess = self.sent.len().saturating_sub(2 * KEPT);
-            self.sent.drain(..excess);
-        }
-        let Event::Sent { topic, .. } = record.event() else {
-            return;
+        let mut keep = |name: &'static str, id: &Member<Text>| {
+            let whole = id
+                .there()
+                .filter(|id| !id.is_empty() && !id.is_cut() && id.len() <= 512);
+            self.sent.extend(whole.map(|id| (name, id.as_str().to_owned())));
         };
-        let Some(name) = TOPICS.into_iter().find(|name| context.topics.get(*name) == Some(topic)) else {
+        let [orders, instant] = TOPICS;
+        if let Some(order) = record.order_to_vehicle() {
+            keep(orders, &order.order_id);
+        }
+        if let Some(message) = record.instant_actions_to_vehicle() {
+            let actions = message.all_actions().take(KEPT);
+            actions.for_each(|action| keep(instant, &action.action_id));
+        }
+        let excess = self.sent.len().saturating_sub(2 * KEPT);
+        self.sent.drain(..excess);
+        if record.seen != Some(Seen::Sent) {
+            return;
+        }
+        let Some(name) = TOPICS.into_iter().find(|name| record.topic_name() == Some(*name)) else {
             return;
         };
         let now = record.at().moment;
@@ -142,32 +140,20 @@ impl Heard {
     }
 
     /// Without the tap: whether a state names what was sent.
-    fn reaction(&mut self, state: &Value) {
-        let order = text(state, "orderId");
-        let listed: BTreeSet<&str> = elements(state, "actionStates")
+    fn reaction(&mut self, state: &StateView) {
+        let order = state.order_id.or_empty();
+        let listed: BTreeSet<&str> = state
+            .all_action_states()
             .take(512)
-            .map(|action| text(action, "actionId"))
+            .map(|action| action.action_id.or_empty())
             .collect();
+        let [orders, instant] = TOPICS;
         for (name, id) in &self.sent {
-            if (*name == "order" && id == order) || (*name == "instantActions" && listed.contains(id.as_str())) {
+            if (*name == orders && id == order) || (*name == instant && listed.contains(id.as_str())) {
                 self.arrived.insert(name);
             }
         }
     }
-}
-
-/// Whether a topic filter covers a topic.
-fn covers(filter: &str, topic: &str) -> bool {
-    let mut levels = topic.split('/');
-    for wanted in filter.split('/') {
-        match (wanted, levels.next()) {
-            ("#", _) => return true,
-            ("+", Some(_)) => {}
-            (wanted, Some(level)) if wanted == level => {}
-            _ => return false,
-        }
-    }
-    levels.next().is_none()
 }
 
 impl Running for Heard {
@@ -191,7 +177,7 @@ impl Running for Heard {
         self.sent(record, context);
         self.overdue(record.at().moment, findings);
         if !record.link.tap
-            && let Some(state) = record.state_json()
+            && let Some(state) = record.state()
         {
             self.reaction(state);
         }
@@ -209,7 +195,6 @@ mod tests {
     use serde_json::json;
 
     use super::super::trace::Trace;
-    use super::covers;
     use tck_journal::event::{Direction, Event, Filter, Packet, Source};
 
     const CHECK: &str = "topic/heard";
@@ -280,11 +265,5 @@ mod tests {
         assert_eq!(outcome.judged, 0);
         trace.state(&json!({ "actionStates": [{ "actionId": "x", "actionStatus": "FINISHED" }] }));
         assert_eq!(trace.judge(CHECK).judged, 1);
-    }
-
-    #[test]
-    fn filters_cover_topics_level_by_level() {
-        assert!(covers("a/+/c", "a/b/c") && covers("a/#", "a/b/c") && covers("a/b/c", "a/b/c"));
-        assert!(!covers("a/b", "a/b/c") && !covers("a/+/d", "a/b/c") && !covers("a/b/c/d", "a/b/c"));
     }
 }

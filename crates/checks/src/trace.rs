@@ -392,7 +392,7 @@ impl Trace {
         let mut judged = 0;
         for entry in self.journal.entries() {
             match self.place(entry) {
-                Some((vehicle, name)) => fleet.borrow_mut().note(entry, vehicle, &name),
+                Some((vehicle, name)) => fleet.borrow_mut().note(entry, vehicle, &name, setting.pack.names()),
                 None => fleet.borrow_mut().link(entry),
             }
             let record = observer.see(entry);

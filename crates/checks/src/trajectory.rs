@@ -2,12 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-use serde_json::Value;
-
 use crate::finding::{broken, remark};
 use tck_base::nurbs::{Curve, Flaw, Path};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{elements, number, text};
+use tck_view::{EdgeState, Node, OrderView, StateView};
+use tck_world::ordered::{allowed_deviation, curve, place_of};
 use tck_world::{Listen, Observation, Topic};
 
 /// `state/trajectory`.
@@ -20,7 +19,7 @@ pub(super) const TRAJECTORY: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[],
-    needs: &[],
+    needs: &[StateView::edge_states, EdgeState::trajectory],
     start: |_| Box::new(Shape::default()),
 };
 
@@ -34,7 +33,7 @@ pub(super) const TRAJECTORY_ENDS: Check = Check {
     arguments: &[],
     listens: &[Listen::ToVehicle(Topic::Order), Listen::Delivered(Topic::State)],
     reads: &[],
-    needs: &[],
+    needs: &[EdgeState::trajectory, Node::node_position],
     start: |_| Box::new(Ends::default()),
 };
 
@@ -48,7 +47,7 @@ pub(super) const PLANNED_PATH: Check = Check {
     arguments: &[],
     listens: &[Listen::ToVehicle(Topic::Order), Listen::Delivered(Topic::State)],
     reads: &[],
-    needs: &[],
+    needs: &[EdgeState::trajectory],
     start: |_| Box::new(Planned::default()),
 };
 
@@ -63,17 +62,11 @@ const END: f64 = 0.5;
 /// The same at its start.
 const START: f64 = 1.0;
 
-/// Reported trajectories of a state: sequenceId, whether it is released, and the trajectory.
-fn reported(state: &Value) -> impl Iterator<Item = (u64, bool, &Value)> {
-    elements(state, "edgeStates").take(EDGES).filter_map(|edge| {
-        let trajectory = edge.get("trajectory").filter(|trajectory| !trajectory.is_null())?;
-        let released = edge.get("released").and_then(Value::as_bool).unwrap_or_default();
-        Some((number(edge, "sequenceId")?, released, trajectory))
-    })
-}
-
-fn order_of(message: &Value) -> String {
-    text(message, "orderId").chars().take(512).collect()
+/// The edges of a state for which a trajectory is reported, with their sequenceIds.
+fn reported(state: &StateView) -> impl Iterator<Item = (u64, &EdgeState)> {
+    let edges = state.edge_states.iter().take(EDGES);
+    let reported = edges.filter(|edge| edge.trajectory.presence().is_something());
+    reported.filter_map(|edge| Some((edge.sequence_id.whole()?, edge)))
 }
 
 #[derive(Default)]
@@ -84,14 +77,14 @@ struct Shape {
 
 impl Running for Shape {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
         let mut judged = false;
-        for (sequence, _, trajectory) in reported(state) {
+        for (sequence, edge) in reported(state) {
             judged = true;
-            for flaw in Curve::read(trajectory).1 {
-                let key = (order_of(state), sequence, flaw.to_string());
+            for flaw in curve(&edge.trajectory).map(|(_, flaws)| flaws).unwrap_or_default() {
+                let key = (state.order_id.or_empty().to_owned(), sequence, flaw.to_string());
                 if self.said.len() >= EDGES || !self.said.insert(key) {
                     continue;
                 }
@@ -118,8 +111,8 @@ struct Places {
 }
 
 impl Places {
-    fn note(&mut self, order: &Value) {
-        let id = order_of(order);
+    fn note(&mut self, order: &OrderView) {
+        let id = order.order_id.or_empty().to_owned();
         let at = self
             .orders
             .iter()
@@ -132,13 +125,12 @@ impl Places {
                 self.orders.len() - 1
             });
         let places = &mut self.orders[at].1;
-        for node in elements(order, "nodes").take(EDGES) {
-            let Some(sequence) = number(node, "sequenceId") else {
+        for node in order.nodes.iter().take(EDGES) {
+            let Some(sequence) = node.sequence_id.whole() else {
                 continue;
             };
-            let member = |name: &str| node.get("nodePosition")?.get(name)?.as_f64();
-            let allowed = member("allowedDeviationXY").unwrap_or_default();
-            let place = member("x").zip(member("y")).map(|(x, y)| (x, y, allowed));
+            let allowed = allowed_deviation(node).unwrap_or_default();
+            let place = place_of(node).map(|(x, y, _)| (x, y, allowed));
             let known = places.entry(sequence).or_insert(place);
             if *known != place {
                 *known = None;
@@ -160,17 +152,18 @@ struct Ends {
 
 impl Running for Ends {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        if let Some(order) = record.to_vehicle_json(Topic::Order) {
+        if let Some(order) = record.order_to_vehicle() {
             self.places.note(order);
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
-        let order = order_of(state);
-        let last = number(state, "lastNodeSequenceId");
+        let order = state.order_id.or_empty();
+        let last = state.last_node_sequence_id.whole();
         let mut judged = false;
-        for (sequence, _, trajectory) in reported(state) {
-            let Some((start, end)) = Curve::read(trajectory).0.as_ref().and_then(Curve::ends) else {
+        for (sequence, edge) in reported(state) {
+            let curve = curve(&edge.trajectory).and_then(|(curve, _)| curve);
+            let Some((start, end)) = curve.as_ref().and_then(Curve::ends) else {
                 continue;
             };
             let ends = [
@@ -183,12 +176,14 @@ impl Running for Ends {
                 (Some(sequence + 1), end, END, "ends"),
             ];
             for (node, point, reach, verb) in ends {
-                let Some((x, y, allowed)) = node.and_then(|node| self.places.of(&order, node)) else {
+                let Some((x, y, allowed)) = node.and_then(|node| self.places.of(order, node)) else {
                     continue;
                 };
                 judged = true;
                 let distance = (x - point.0).hypot(y - point.1);
-                if distance > reach + allowed && self.said.len() < EDGES && self.said.insert((order.clone(), sequence))
+                if distance > reach + allowed
+                    && self.said.len() < EDGES
+                    && self.said.insert((order.to_owned(), sequence))
                 {
                     let message = format!("the trajectory of edge {sequence} {verb} {distance:.2} m from its node");
                     findings.push(broken("ORD-MSG-30", record.seq(), message));
@@ -211,29 +206,32 @@ struct Planned {
 
 impl Running for Planned {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        if let Some(order) = record.to_vehicle_json(Topic::Order) {
-            let edges = elements(order, "edges").filter(|edge| edge.get("corridor").is_some_and(|one| !one.is_null()));
-            for sequence in edges.filter_map(|edge| number(edge, "sequenceId")) {
+        if let Some(order) = record.order_to_vehicle() {
+            let edges = order
+                .edges
+                .iter()
+                .filter(|edge| edge.corridor.presence().is_something());
+            for sequence in edges.filter_map(|edge| edge.sequence_id.whole()) {
                 if self.free.len() < EDGES {
-                    self.free.insert((order_of(order), sequence));
+                    self.free.insert((order.order_id.or_empty().to_owned(), sequence));
                 }
             }
         }
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
-        let order = order_of(state);
+        let order = state.order_id.or_empty();
         if self.order != order {
-            self.order = order;
+            order.clone_into(&mut self.order);
             self.first.clear();
             self.said.clear();
         }
         let mut judged = false;
-        for (sequence, released, trajectory) in reported(state) {
-            if !released || self.free.contains(&(self.order.clone(), sequence)) {
+        for (sequence, edge) in reported(state) {
+            if !edge.released.is(true) || self.free.contains(&(self.order.clone(), sequence)) {
                 continue;
             }
-            let Some(path) = Curve::read(trajectory).0.map(|curve| curve.path()) else {
+            let Some(path) = curve(&edge.trajectory).and_then(|(curve, _)| Some(curve?.path())) else {
                 continue;
             };
             let Some(first) = self.first.get(&sequence) else {
@@ -260,7 +258,7 @@ impl Running for Planned {
 mod tests {
     use super::*;
     use crate::trace::Trace;
-    use serde_json::json;
+    use serde_json::{Value, json};
 
     fn line(points: &[(f64, f64)]) -> Value {
         let last = points.len() - 1;

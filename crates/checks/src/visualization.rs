@@ -140,8 +140,8 @@ impl Running for Rate {
         let Some(message) = record.delivered().filter(|_| !record.link.disturbed) else {
             return false;
         };
-        match message.name {
-            "factsheet" => {
+        match message.topic {
+            Topic::Factsheet => {
                 let sheet = record.message().and_then(MessageView::factsheet);
                 let interval = sheet.and_then(|sheet| sheet.timing()?.visualization_interval.float());
                 self.stated = interval
@@ -149,12 +149,12 @@ impl Running for Rate {
                     .map(Duration::from_secs_f64);
                 false
             }
-            "visualization" => {
+            Topic::Visualization => {
                 self.published = true;
                 self.gaps.extend(self.rhythm.beat(now, self.stated));
                 self.presence_only || self.judge(record.seq(), findings)
             }
-            "state" => {
+            Topic::State => {
                 self.since.get_or_insert(now);
                 self.silence(now, record.seq(), findings);
                 false

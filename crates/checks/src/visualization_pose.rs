@@ -5,11 +5,11 @@
 use std::time::Duration;
 use tck_journal::event::Event;
 
-use super::state::driving::Pose;
+use super::state::driving::stays;
 use crate::finding::{broken, remark};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_view::{StateView, VisualizationView};
+use tck_view::{Pose, StateView, VisualizationView};
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// How far it may be from the states of a vehicle at rest, in metres and radians.
@@ -71,7 +71,7 @@ impl Position {
                 continue;
             }
             let (far, turned) = at.apart(&pose);
-            if pose.map == at.map && far <= BESIDE && turned <= BESIDE {
+            if pose.map_id == at.map_id && far <= BESIDE && turned <= BESIDE {
                 continue;
             }
             self.beside += 1;
@@ -142,15 +142,15 @@ impl Running for Position {
         }
         let now = record.at().moment;
         if let Some(state) = record.state() {
-            let pose = Pose::of(&state.position).filter(|_| state.driving.is(false));
-            let seen = Pose::of(&state.position);
+            let seen = state.pose();
+            let pose = seen.clone().filter(|_| state.driving.is(false));
             self.known = seen.is_some();
             let measured = self.measure(seen.as_ref(), findings);
             self.last = seen;
             let before = self.stood.take();
             self.stood = pose.clone().map(|pose| (now, pose));
             return match (before, pose) {
-                (Some((_, before)), Some(pose)) if before.stays(&pose) => self.compare(&pose, findings),
+                (Some((_, before)), Some(pose)) if stays(&before, &pose) => self.compare(&pose, findings),
                 _ => {
                     self.since.clear();
                     measured
@@ -168,11 +168,11 @@ impl Running for Position {
             }
             return self.known;
         }
-        if let Some(pose) = Pose::of(&message.position).filter(|_| self.on_the_way.len() < WAITING) {
+        if let Some(pose) = message.pose().filter(|_| self.on_the_way.len() < WAITING) {
             self.on_the_way.push((record.seq(), pose));
         }
         let stood = self.stood.as_ref().is_some_and(|(at, _)| now.since(*at) > OVERTAKING);
-        if let Some(pose) = Pose::of(&message.position).filter(|_| stood && self.since.len() < WAITING) {
+        if let Some(pose) = message.pose().filter(|_| stood && self.since.len() < WAITING) {
             self.since.push((record.seq(), pose));
         }
         false

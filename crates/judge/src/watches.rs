@@ -159,7 +159,9 @@ impl Watches {
         let place = timeline.place(entry);
         match place {
             Some(place) if !self.others.is_empty() => {
-                self.fleet.borrow_mut().note(entry, place.vehicle, &place.name);
+                self.fleet
+                    .borrow_mut()
+                    .note(entry, place.vehicle, &place.name, ground.pack.names());
             }
             Some(_) => {}
             None => self.fleet.borrow_mut().link(entry),

@@ -8,12 +8,12 @@ use std::sync::Arc;
 
 use tck_base::clock::Moment;
 use tck_view::{
-    ArrayLimits, FactsheetView, List, Member, Number, OfferedAction, OfferedParameter, OptionalParameter, StringLimits,
-    Text,
+    ArrayLimits, FactsheetView, List, Member, Number, OfferedAction, OfferedParameter, OptionalParameter, Print,
+    StringLimits, Text,
 };
 
-use crate::members::ELEMENTS;
 use crate::observation::Observation;
+use crate::ordered::ELEMENTS;
 use crate::setting::Setting;
 
 /// What a factsheet says about an action.
@@ -145,7 +145,7 @@ impl Factsheet {
 #[derive(Debug, Default)]
 pub struct Factsheets {
     now: Option<Arc<Factsheet>>,
-    said: Option<u64>,
+    said: Option<Print>,
     since: Option<Moment>,
     /// Those before, until when they count.
     before: Vec<(Arc<Factsheet>, Moment)>,

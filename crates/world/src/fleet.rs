@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use tck_base::clock::Moment;
-use tck_base::pattern::whole;
 use tck_journal::Entry;
 use tck_journal::event::{Direction, Event, Packet};
+use tck_view::{MessageView, Names, OrderView, Topic};
 
 /// How many orders are remembered.
 const ORDERS: usize = 4096;
@@ -40,20 +40,24 @@ struct Link {
 }
 
 impl FleetSeen {
-    /// Learns from an entry that belongs to the topic of that name of a vehicle.
-    pub fn note(&mut self, entry: &Entry, vehicle: usize, name: &str) {
+    /// Learns from an entry that belongs to the topic of that name of a vehicle; `names` are those of its version.
+    pub fn note(&mut self, entry: &Entry, vehicle: usize, name: &str, names: &Names) {
         let published = is_published(entry);
         self.tap |= published;
         let delivered = matches!(entry.event(), Event::Message { retain: false, .. });
         if published || (delivered && !self.tap) {
-            let id = entry.json().and_then(|value| whole(value.get("headerId")?));
+            let message = entry.view(Topic::of_name(name), names);
+            let id = message.and_then(|message| message.header().header_id.whole());
             if let Some(id) = id.and_then(|id| u32::try_from(id).ok()) {
                 let before = self.ids.insert(name.to_owned(), (entry.seq(), id));
                 self.before = before.map(|(_, before)| (entry.seq(), before));
             }
         }
-        if delivered && name == "order" {
-            self.order(entry, vehicle);
+        if delivered
+            && name == Topic::Order.as_str()
+            && let Some(order) = entry.view(Topic::Order, names).and_then(MessageView::order)
+        {
+            self.order(order, vehicle);
         }
     }
 
@@ -102,11 +106,8 @@ impl FleetSeen {
             .then(|| filters.any(|filter| takes(filter, topic)))
     }
 
-    fn order(&mut self, entry: &Entry, vehicle: usize) {
-        let Some(order) = entry.json() else { return };
-        let Some(id) = order.get("orderId").and_then(|id| id.as_str()) else {
-            return;
-        };
+    fn order(&mut self, order: &OrderView, vehicle: usize) {
+        let Some(id) = order.order_id.text() else { return };
         if self.owners.len() < ORDERS && begins(order) {
             self.owners.entry(id.to_owned()).or_insert(vehicle);
         }
@@ -124,13 +125,8 @@ impl FleetSeen {
 }
 
 /// Whether an order message begins where orders begin.
-fn begins(order: &serde_json::Value) -> bool {
-    let nodes = order.get("nodes").and_then(serde_json::Value::as_array);
-    nodes.is_some_and(|nodes| {
-        nodes
-            .iter()
-            .any(|node| node.get("sequenceId").and_then(whole) == Some(0))
-    })
+fn begins(order: &OrderView) -> bool {
+    order.nodes.iter().any(|node| node.sequence_id.whole() == Some(0))
 }
 
 /// Whether an entry is a PUBLISH packet of the device.

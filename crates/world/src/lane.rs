@@ -2,11 +2,20 @@
 
 use std::f64::consts::PI;
 
-use serde_json::Value;
-use tck_base::nurbs::{Beside, Curve, Path};
+use tck_base::nurbs::{Beside, Path};
+use tck_view::{Deviation, Edge, Member, Node, NodePosition, Number, Pose, Text};
 
-use crate::members::{elements, kept, number, text};
-use crate::pose::{Pose, finite};
+use crate::ordered::curve;
+
+/// Whether a number can be calculated with.
+fn is_sane(number: f64) -> bool {
+    number.abs() < 1e9
+}
+
+/// A number that can be calculated with.
+pub(crate) fn sane(member: &Member<Number>) -> Option<f64> {
+    member.float().filter(|number| is_sane(*number))
+}
 
 /// An angle brought into -π … π.
 #[must_use]
@@ -24,8 +33,8 @@ pub fn apart(one: f64, other: f64) -> f64 {
 /// nodePosition of an ordered node.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OrderedPlace {
-    /// mapId.
-    pub map: String,
+    /// mapId; empty where the order names none.
+    pub map: Text,
     /// Metres.
     pub x: f64,
     /// Metres.
@@ -54,25 +63,29 @@ pub struct OrderedNode {
 impl OrderedNode {
     /// Reads a node of an order.
     #[must_use]
-    pub fn read(node: &Value) -> Option<Self> {
+    pub fn read(node: &Node) -> Option<Self> {
         Some(Self {
-            sequence: number(node, "sequenceId")?,
-            id: kept(node, "nodeId"),
-            place: node.get("nodePosition").and_then(OrderedPlace::read),
-            acts: elements(node, "actions").next().is_some(),
+            sequence: node.sequence_id.whole()?,
+            id: node.node_id.or_empty().to_owned(),
+            place: node
+                .node_position
+                .there()
+                .and_then(|position| OrderedPlace::read(position)),
+            acts: !node.actions.is_empty(),
         })
     }
 }
 
 impl OrderedPlace {
-    fn read(position: &Value) -> Option<Self> {
+    fn read(position: &NodePosition) -> Option<Self> {
+        let deviation = position.allowed_deviation_xy.there();
         Some(Self {
-            map: kept(position, "mapId"),
-            x: finite(position, "x")?,
-            y: finite(position, "y")?,
-            theta: finite(position, "theta"),
-            deviation: finite(position, "allowedDeviationXY"),
-            deviation_theta: finite(position, "allowedDeviationTheta"),
+            map: position.map_id.there().cloned().unwrap_or_default(),
+            x: sane(&position.x)?,
+            y: sane(&position.y)?,
+            theta: sane(&position.theta),
+            deviation: deviation.and_then(Deviation::radius).filter(|radius| is_sane(*radius)),
+            deviation_theta: sane(&position.allowed_deviation_theta),
         })
     }
 
@@ -123,12 +136,12 @@ pub struct Corridor {
 }
 
 impl Corridor {
-    fn read(corridor: &Value) -> Option<Self> {
-        let width = |name| finite(corridor, name).filter(|width| *width >= 0.0);
+    fn read(corridor: &tck_view::Corridor) -> Option<Self> {
+        let width = |member| sane(member).filter(|width| *width >= 0.0);
         Some(Self {
-            left: width("leftWidth")?,
-            right: width("rightWidth")?,
-            contour: text(corridor, "corridorRefPoint") == "CONTOUR",
+            left: width(&corridor.left_width)?,
+            right: width(&corridor.right_width)?,
+            contour: corridor.reference_point.is("CONTOUR"),
         })
     }
 }
@@ -136,22 +149,20 @@ impl Corridor {
 impl Demands {
     /// Reads an edge of an order.
     #[must_use]
-    pub fn read(edge: &Value) -> Option<Self> {
-        let kind = text(edge, "orientationType");
+    pub fn read(edge: &Edge) -> Option<Self> {
+        let kind = edge.orientation_type.or_empty();
+        let curve = curve(&edge.trajectory);
         Some(Self {
-            sequence: number(edge, "sequenceId")?,
-            max_speed: finite(edge, "maxSpeed").filter(|speed| *speed > 0.0),
-            max_rotation_speed: finite(edge, "maxRotationSpeed").filter(|speed| *speed > 0.0),
+            sequence: edge.sequence_id.whole()?,
+            max_speed: sane(&edge.max_speed).filter(|speed| *speed > 0.0),
+            max_rotation_speed: sane(&edge.max_rotation_speed).filter(|speed| *speed > 0.0),
             // What another word than these asks for is not known.
-            orientation: finite(edge, "orientation").filter(|_| matches!(kind, "" | "GLOBAL" | "TANGENTIAL")),
+            orientation: sane(&edge.orientation).filter(|_| matches!(kind, "" | "GLOBAL" | "TANGENTIAL")),
             global: kind == "GLOBAL",
-            rotation_allowed: edge.get("rotationAllowed").and_then(Value::as_bool),
-            curved: edge.get("trajectory").is_some_and(|curve| !curve.is_null()),
-            path: edge
-                .get("trajectory")
-                .and_then(|curve| Curve::read(curve).0)
-                .map(|curve| curve.path()),
-            corridor: edge.get("corridor").and_then(Corridor::read),
+            rotation_allowed: edge.rotation_allowed.flag(),
+            curved: curve.is_some(),
+            path: curve.and_then(|(curve, _)| curve).map(|curve| curve.path()),
+            corridor: edge.corridor.there().and_then(|corridor| Corridor::read(corridor)),
         })
     }
 }
@@ -225,7 +236,7 @@ impl Lane {
             .demands
             .path
             .as_ref()
-            .filter(|_| pose.map == from.map && pose.map == to.map)?;
+            .filter(|_| pose.map_id == from.map && pose.map_id == to.map)?;
         let beside = path.beside(pose.x, pose.y)?;
         let spot = path.at(beside.made)?;
         let straight = Path::through([(from.x, from.y), (to.x, to.y)]);
@@ -250,7 +261,7 @@ impl Lane {
     pub fn along(&self, pose: &Pose) -> Option<Along> {
         let (from, to) = (self.from.place.as_ref()?, self.to.place.as_ref()?);
         let heading = self.heading()?;
-        if pose.map != from.map {
+        if pose.map_id != from.map {
             return None;
         }
         let (x, y) = (pose.x - from.x, pose.y - from.y);

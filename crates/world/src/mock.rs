@@ -4,12 +4,12 @@ use std::collections::VecDeque;
 
 use tck_base::clock::Moment;
 use tck_journal::event::Event;
-use tck_view::{ErrorView, Field, OrderView, StateView};
+use tck_view::{Field, OrderView, StateView};
 
-use crate::members::ELEMENTS;
 use crate::observation::Observation;
-use crate::ordered::short;
+use crate::ordered::{ELEMENTS, short};
 use crate::setting::Setting;
+use crate::shown::is_taken_out;
 
 /// How many states are kept.
 const STATES: usize = 64;
@@ -89,14 +89,6 @@ impl ShownState {
     pub fn is_idle(&self) -> bool {
         self.base + self.horizon == 0 && !self.driving
     }
-}
-
-/// Whether a state shows what takes a vehicle out of its order, but for a failed action.
-fn is_taken_out(state: &StateView) -> bool {
-    let manual = matches!(state.operating_mode.or_empty(), "MANUAL" | "SERVICE" | "TEACHIN");
-    let stopped = matches!(state.emergency_stop(), Some("AUTOACK" | "MANUAL" | "REMOTE"));
-    let fatal = |error: &ErrorView| !matches!(error.error_level.or_empty(), "WARNING" | "URGENT");
-    manual || stopped || state.errors.iter().any(fatal)
 }
 
 /// The orderUpdateIds of the order of this state that errors name.

@@ -1,6 +1,5 @@
 //! A record as it concerns one vehicle: whose message it is, on which topic, how it was seen, and what the link was like.
 
-use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,12 +10,11 @@ use tck_journal::event::{Direction, Event, LinkFault, Packet};
 use tck_journal::{Entry, Parsed, Payload};
 use tck_pack::{Pack, Role};
 use tck_view::{
-    ConnectionView, FactsheetView, InstantActionsView, MessageView, Names, OrderView, StateView, Topic,
+    ConnectionView, FactsheetView, Header, InstantActionsView, MessageView, Names, OrderView, Print, StateView, Topic,
     VisualizationView,
 };
 
 use crate::listen::{Kind, Seen};
-use crate::print;
 use crate::topics::{Named, Topics};
 
 /// What is known of the link to the device under test.
@@ -71,11 +69,11 @@ impl Observer {
             entry,
             seen: way,
             named,
+            topics: &self.topics,
             names: &self.names,
             link: self.link,
             role: self.role,
             kind,
-            content: OnceCell::new(),
         }
     }
 
@@ -141,12 +139,12 @@ pub struct Observation<'a> {
     /// How a message was seen, if this is about one.
     pub seen: Option<Seen>,
     named: Option<&'a Named>,
+    topics: &'a Topics,
     names: &'a Names,
     /// What the link is like, this record included.
     pub link: Link,
     role: Role,
     kind: Kind,
-    content: OnceCell<Option<u64>>,
 }
 
 /// A message of the device under test.
@@ -198,6 +196,25 @@ impl<'a> Observation<'a> {
         self.entry.view(self.topic()?, self.names)
     }
 
+    /// The message as one of another topic, on which it may have been meant; `None` when it is no JSON.
+    #[must_use]
+    pub fn message_as(&self, topic: Topic) -> Option<&'a MessageView> {
+        self.entry.view(topic, self.names)
+    }
+
+    /// The header of the message, whatever its topic; `None` when it is no JSON.
+    #[must_use]
+    pub fn header(&self) -> Option<&'a Header> {
+        let message = self.message_as(self.topic().unwrap_or(Topic::Other));
+        message.map(MessageView::header)
+    }
+
+    /// A connection message, whoever sent it and however it was seen. It may be no object.
+    #[must_use]
+    pub fn connection_message(&self) -> Option<&'a Arc<ConnectionView>> {
+        self.message()?.connection()
+    }
+
     /// What the version calls the members of messages: to show one as evidence.
     #[must_use]
     pub fn names(&self) -> &'a Names {
@@ -239,6 +256,19 @@ impl<'a> Observation<'a> {
     #[must_use]
     pub fn topic_name(&self) -> Option<&'a str> {
         self.named.map(|named| named.name.as_str())
+    }
+
+    /// The name of the topic of the vehicle on which a connection that is opened has its last will.
+    #[must_use]
+    pub fn will_topic_name(&self) -> Option<&'a str> {
+        let Event::Packet {
+            packet: Packet::Connect { will: Some(will), .. },
+            ..
+        } = self.event()
+        else {
+            return None;
+        };
+        self.topics.of(&will.topic).map(|named| named.name.as_str())
     }
 
     /// Whether it is a message on this topic that was seen in this way.
@@ -344,12 +374,6 @@ impl<'a> Observation<'a> {
         value.filter(|value| value.is_object())
     }
 
-    /// A live state of the device under test, if it is an object.
-    #[must_use]
-    pub fn state_json(&self) -> Option<&'a Value> {
-        self.delivered_json(Topic::State)
-    }
-
     /// Whether this is a message towards the vehicle on that topic, from the harness or from a master control, readable or not.
     #[must_use]
     pub fn is_to_vehicle(&self, topic: Topic) -> bool {
@@ -375,12 +399,6 @@ impl<'a> Observation<'a> {
         self.to_vehicle(Topic::InstantActions)?.instant_actions()
     }
 
-    /// The JSON of a message towards the vehicle on that topic, from the harness or from a master control that was recorded.
-    #[must_use]
-    pub fn to_vehicle_json(&self, topic: Topic) -> Option<&'a Value> {
-        self.is_to_vehicle(topic).then(|| self.json()).flatten()
-    }
-
     /// What a mock vehicle of the harness says on that topic, if it is an object.
     #[must_use]
     pub fn said(&self, topic: Topic) -> Option<&'a MessageView> {
@@ -404,13 +422,6 @@ impl<'a> Observation<'a> {
     #[must_use]
     pub fn said_factsheet(&self) -> Option<&'a Arc<FactsheetView>> {
         self.said(Topic::Factsheet)?.factsheet()
-    }
-
-    /// The JSON of what a mock vehicle of the harness says on that topic, if it is an object.
-    #[must_use]
-    pub fn said_json(&self, topic: Topic) -> Option<&'a Value> {
-        let value = self.is(Seen::Sent, topic).then(|| self.json()).flatten();
-        value.filter(|value| value.is_object())
     }
 
     /// A PUBLISH packet of the device.
@@ -466,10 +477,10 @@ impl<'a> Observation<'a> {
         self.connects() || self.is_delivered(Topic::Connection)
     }
 
-    /// A print of the message without what changes when it is sent again; worked out once.
+    /// The fingerprint of the message without what changes when it is sent again.
     #[must_use]
-    pub fn content(&self) -> Option<u64> {
-        *self.content.get_or_init(|| self.json().map(print::of_content))
+    pub fn content(&self) -> Option<Print> {
+        self.message().map(MessageView::content)
     }
 }
 

@@ -3,7 +3,8 @@
 use tck_base::nurbs::{Curve, Flaw, Written, WrittenPoint};
 use tck_view::{ControlPoint, Edge, Element, List, Member, Node, Number, OrderView, Text, Trajectory};
 
-use crate::members::ELEMENTS;
+/// How many elements of one list are looked at.
+pub const ELEMENTS: usize = 2048;
 
 /// The nodes, and the edges, that are looked at.
 pub fn elements(order: &OrderView) -> impl Iterator<Item = Element<'_>> {
@@ -55,10 +56,18 @@ fn written(member: &Member<Number>) -> Option<f64> {
     (!member.is_absent()).then(|| member.float().unwrap_or(f64::NAN))
 }
 
-/// A trajectory: what is wrong with it, and the curve if it can be calculated with all the same. One that is too long to be kept is
-/// not calculated with.
+/// The trajectory of an edge: what is wrong with it, and the curve if it can be calculated with all the same; `None` where there is
+/// none. One that is too long to be kept is not calculated with, and one that is no object lacks everything.
 #[must_use]
-pub fn curve(trajectory: &Trajectory) -> (Option<Curve>, Vec<Flaw>) {
+pub fn curve(trajectory: &Member<Box<Trajectory>>) -> Option<(Option<Curve>, Vec<Flaw>)> {
+    match trajectory {
+        Member::Absent | Member::Null => None,
+        Member::Other(_) => Some(read(&Trajectory::default())),
+        Member::There(trajectory) => Some(read(trajectory)),
+    }
+}
+
+fn read(trajectory: &Trajectory) -> (Option<Curve>, Vec<Flaw>) {
     let is_cut = trajectory.knot_vector.there().is_some_and(List::is_cut);
     if is_cut || trajectory.control_points.there().is_some_and(List::is_cut) {
         return (None, Vec::new());

@@ -22,12 +22,3 @@ pub struct Setting<'a> {
     /// How long something may take.
     pub time: &'a TimeLimits,
 }
-
-impl Setting<'_> {
-    /// The topic name of a full topic that stands somewhere else than on the record: in a last will.
-    #[must_use]
-    pub fn topic_name(&self, full: &str) -> Option<&str> {
-        let mut all = self.topics.iter();
-        all.find(|(_, topic)| *topic == full).map(|(name, _)| name.as_str())
-    }
-}

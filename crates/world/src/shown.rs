@@ -2,9 +2,6 @@
 
 use std::sync::Arc;
 
-use serde_json::Value;
-
-use crate::members::{elements, text};
 use crate::observation::Observation;
 use crate::orders::sets_position;
 use tck_view::{ActionState, ErrorView, Print, StateView};
@@ -129,14 +126,8 @@ pub fn fatal_errors(state: &StateView) -> impl Iterator<Item = &ErrorView> {
 
 /// Whether a state reports what [`may_abandon`] asks for but a failed action: whatever is left of the order is still to be
 /// seen then.
-#[must_use]
-pub fn is_taken_out(state: &Value) -> bool {
-    let manual = matches!(text(state, "operatingMode"), "MANUAL" | "SERVICE" | "TEACHIN");
-    let stopped = state
-        .pointer("/safetyState/eStop")
-        .is_some_and(|stop| matches!(stop.as_str(), Some("AUTOACK" | "MANUAL" | "REMOTE")));
-    let fatal = elements(state, "errors").any(|error| !matches!(text(error, "errorLevel"), "WARNING" | "URGENT"));
-    manual || stopped || fatal
+pub(crate) fn is_taken_out(state: &StateView) -> bool {
+    is_taken_out_beside(state, &[])
 }
 
 fn is_taken_out_beside(state: &StateView, borne: &[Print]) -> bool {

@@ -4,10 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use tck_view::OrderView;
 
-use crate::members::ELEMENTS;
 use crate::mock::MockVehicle;
 use crate::observation::Observation;
-use crate::ordered::{nodes_in_sequence, place_of, short};
+use crate::ordered::{ELEMENTS, nodes_in_sequence, place_of, short};
 
 /// How many ids are remembered.
 const IDS: usize = 1024;

@@ -4,16 +4,13 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
-use serde_json::Value;
 use tck_base::clock::Moment;
 
-use crate::lane::{Demands, Lane, OrderedNode};
-use crate::members::{elements, kept, number};
+use crate::lane::{Demands, Lane, OrderedNode, sane};
 use crate::observation::Observation;
 use crate::orders::{Element, OrdersSent, edges_left, nodes_left};
-use crate::pose::{Pose, sane};
 use crate::shown::ShownOrder;
-use tck_view::{StateView, Topic};
+use tck_view::{Element as Ordered, OrderView, Pose, StateView};
 
 /// How many order messages are kept, and how many elements of each.
 const MESSAGES: usize = 64;
@@ -116,23 +113,17 @@ struct Plan {
 }
 
 impl Plan {
-    fn read(message: &Value) -> Option<Self> {
+    fn read(message: &OrderView) -> Option<Self> {
+        let (nodes, edges) = (message.nodes.iter().take(ELEMENTS), message.edges.iter().take(ELEMENTS));
+        let all = nodes.clone().map(Ordered::Node).chain(edges.clone().map(Ordered::Edge));
         Some(Self {
-            order: kept(message, "orderId"),
-            update: number(message, "orderUpdateId")?,
-            stops: elements(message, "nodes")
-                .take(ELEMENTS)
-                .filter_map(OrderedNode::read)
-                .collect(),
-            edges: elements(message, "edges")
-                .take(ELEMENTS)
-                .filter_map(Demands::read)
-                .collect(),
-            planned: elements(message, "nodes")
-                .take(ELEMENTS)
-                .chain(elements(message, "edges").take(ELEMENTS))
-                .filter(|element| element.get("released").and_then(Value::as_bool) == Some(false))
-                .filter_map(|element| number(element, "sequenceId"))
+            order: message.order_id.or_empty().to_owned(),
+            update: message.order_update_id.whole()?,
+            stops: nodes.filter_map(OrderedNode::read).collect(),
+            edges: edges.filter_map(Demands::read).collect(),
+            planned: all
+                .filter(|element| element.released().is(false))
+                .filter_map(|element| element.sequence_id().whole())
                 .collect(),
         })
     }
@@ -164,7 +155,7 @@ pub struct Step {
 impl Way {
     /// Learns from the next record.
     pub(crate) fn learn(&mut self, record: &Observation<'_>, shown: &ShownOrder, orders: &OrdersSent) {
-        if let Some(plan) = record.to_vehicle_json(Topic::Order).and_then(Plan::read)
+        if let Some(plan) = record.order_to_vehicle().and_then(|order| Plan::read(order))
             && self.plans.back() != Some(&plan)
         {
             if self.plans.len() == MESSAGES {
@@ -245,7 +236,8 @@ impl Way {
             fresh: true,
             lane,
             ahead,
-            pose: Pose::read(state),
+            // An angle far beyond pi is in other units.
+            pose: state.pose().filter(|pose| pose.theta.abs() < 3.2),
             velocity: Velocity::read(state),
             driving: state.driving.flag(),
             base_done: !nodes.iter().any(is_ahead),

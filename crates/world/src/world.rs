@@ -6,6 +6,7 @@ use std::rc::Rc;
 use crate::displaced::Displaced;
 use crate::factsheets::Factsheets;
 use crate::fleet::FleetSeen;
+use crate::instant::InstantActionsSent;
 use crate::malformed::MalformedOrders;
 use crate::mock::MockVehicle;
 use crate::observation::Observation;
@@ -27,6 +28,8 @@ pub enum Fact {
     Orders,
     /// [`World::malformed`].
     Malformed,
+    /// [`World::instant`].
+    Instant,
     /// [`World::shown`].
     Shown,
     /// [`World::way`].
@@ -79,6 +82,7 @@ pub struct World {
     displaced: Displaced,
     orders: OrdersSent,
     malformed: MalformedOrders,
+    instant: InstantActionsSent,
     shown: ShownOrder,
     way: Way,
     mock: MockVehicle,
@@ -118,6 +122,9 @@ impl World {
         }
         if learns(Fact::Malformed) {
             self.malformed.learn(record, setting, &self.orders);
+        }
+        if learns(Fact::Instant) {
+            self.instant.learn(record, setting);
         }
         if learns(Fact::Shown) {
             self.shown.learn(record);
@@ -164,6 +171,12 @@ impl World {
     #[must_use]
     pub fn malformed(&self) -> &MalformedOrders {
         self.read(Fact::Malformed, &self.malformed)
+    }
+
+    /// The instant actions that are sent to it.
+    #[must_use]
+    pub fn instant(&self) -> &InstantActionsSent {
+        self.read(Fact::Instant, &self.instant)
     }
 
     /// The order its states show.

@@ -24,7 +24,7 @@ pub(crate) const CORRIDORS: Check = Check {
     arguments: &[],
     listens: &[Listen::Sent(Topic::State), Listen::Delivered(Topic::Order)],
     reads: &[Fact::Factsheets],
-    needs: &[],
+    needs: &[Edge::corridor],
     start: |_| Box::new(Corridors::default()),
 };
 
@@ -54,8 +54,8 @@ fn widths(edge: &Edge) -> Option<(f64, f64)> {
 }
 
 fn path(edge: &Edge, from: &Node, to: &Node) -> Option<Path> {
-    if edge.trajectory.presence().is_something() {
-        return curve(edge.trajectory.there()?).0.map(|curve| curve.path());
+    if let Some((curve, _)) = curve(&edge.trajectory) {
+        return curve.map(|curve| curve.path());
     }
     let ((ax, ay, _), (bx, by, _)) = (place_of(from)?, place_of(to)?);
     Some(Path::through([(ax, ay), (bx, by)]))

@@ -9,8 +9,8 @@ use crate::finding::quote;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::Event;
-use tck_view::{Node, OrderView};
-use tck_world::members::ELEMENTS;
+use tck_view::{Node, OrderView, Print};
+use tck_world::ordered::ELEMENTS;
 use tck_world::{Fact, Listen, Observation, Outside, ShownState, Topic};
 
 /// `commands/updates`.
@@ -168,7 +168,7 @@ struct BaseEnd {
 #[derive(Debug)]
 struct Sent {
     update: u64,
-    print: Option<u64>,
+    print: Option<Print>,
     end: Option<BaseEnd>,
 }
 
@@ -193,7 +193,7 @@ struct Follow {
     /// The order the vehicle had when it went away; it counts again when a state shows it unchanged.
     parked: Option<Order>,
     /// Numbers and contents of what was sent before the link was disturbed, by orderId.
-    numbers: BTreeMap<String, Vec<(u64, Option<u64>)>>,
+    numbers: BTreeMap<String, Vec<(u64, Option<Print>)>>,
 }
 
 fn end(order: &OrderView) -> Option<BaseEnd> {

@@ -8,7 +8,7 @@ use super::{Command, ELEMENTS, Each, Found, nodes_in_sequence, place_of, short};
 use crate::finding::{missing_or, quote, show};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_view::{ActionView, Json, Scope, StateView};
+use tck_view::{ActionView, Json, Print, Scope, StateView};
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// `commands/map-enabled`.
@@ -28,7 +28,7 @@ pub(crate) const ENABLED: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Mock],
-    needs: &[],
+    needs: &[StateView::maps, ActionView::action_parameters],
     start: |_| Box::new(Enabled::default()),
 };
 
@@ -48,7 +48,7 @@ pub(crate) const ON_BOARD: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Mock],
-    needs: &[],
+    needs: &[StateView::maps, ActionView::action_parameters],
     start: |_| Box::new(OnBoard::default()),
 };
 
@@ -63,7 +63,7 @@ pub(crate) const DOWNLOADS: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[],
-    needs: &[],
+    needs: &[ActionView::action_parameters],
     start: |_| Each::start(download),
 };
 
@@ -83,7 +83,7 @@ pub(crate) const DUPLICATES: Check = Check {
         Listen::Delivered(Topic::InstantActions),
     ],
     reads: &[Fact::Mock],
-    needs: &[],
+    needs: &[StateView::maps, ActionView::action_parameters],
     start: |context| {
         Box::new(Duplicates {
             settled: context.with.get("settled") == Some(&Value::Bool(true)),
@@ -143,8 +143,8 @@ fn is_remote(link: &str) -> bool {
 
 /// mapId and mapVersion of an action on maps.
 fn pair(action: &ActionView) -> Option<(String, String)> {
-    let text = |key: &str| Some(action.argument(key).text()?.chars().take(256).collect());
-    Some((text("mapId")?, text("mapVersion").unwrap_or_default()))
+    let word = |key: &str| Some(action.argument(key).text()?.chars().take(256).collect());
+    Some((word("mapId")?, word("mapVersion").unwrap_or_default()))
 }
 
 #[derive(Default)]
@@ -156,7 +156,7 @@ struct Enabled {
     /// Maps that are enabled on the way, or were by an action that has ended well.
     usable: BTreeSet<String>,
     /// What the last order said: whoever sends it again because no state shows it uses no map that was not used before.
-    sent: Option<u64>,
+    sent: Option<Print>,
 }
 
 impl Running for Enabled {

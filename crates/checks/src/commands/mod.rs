@@ -55,8 +55,9 @@ use crate::finding::{broken, remark};
 use tck_check::{CheckContext, CheckFinding, Running};
 use tck_view::{ActionView, Element, InstantActionsView, OrderView, Scope};
 use tck_world::Observation;
-use tck_world::members::ELEMENTS;
-use tck_world::ordered::{allowed_deviation, edges_in_sequence, elements, nodes_in_sequence, place_of, short};
+use tck_world::ordered::{
+    ELEMENTS, allowed_deviation, edges_in_sequence, elements, nodes_in_sequence, place_of, short,
+};
 
 /// How many findings of one kind a message is worth.
 const REPORTED: usize = 4;

@@ -287,7 +287,7 @@ impl Running for Mandatory {
         for (_, action) in command.actions() {
             let kind = action.action_type.or_empty();
             let mandatory = predefined(action, context).into_iter().flatten();
-            for (key, rule) in mandatory.filter(|(_, rule)| rule.get("optional") == Some(&Value::Bool(false))) {
+            for (key, _) in mandatory.filter(|(_, rule)| rule.get("optional") == Some(&Value::Bool(false))) {
                 judged = true;
                 let value = action.argument(key);
                 if value.is_absent() {
@@ -302,7 +302,8 @@ impl Running for Mandatory {
                     }
                     continue;
                 }
-                let wanted = rule.get("type").and_then(Value::as_str).unwrap_or_default();
+                let wanted = context.pack.word(&format!("action.{kind}.parameters.{key}.type"));
+                let wanted = wanted.unwrap_or_default();
                 if !is_of_type(value.there().unwrap_or(&Json::Null), wanted) {
                     found.broken("ACT-31", format!("parameter {key} of {kind} is {}", show(value)));
                 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{Found, edges_in_sequence, elements, nodes_in_sequence, short};
 use crate::finding::quote;
 use tck_view::{Deviation, Field, Member, Node, NodePosition, Number, OrderView, Print};
-use tck_world::members::ELEMENTS;
+use tck_world::ordered::ELEMENTS;
 
 /// The released elements of a message: sequenceId and id.
 pub(super) fn base(order: &OrderView) -> impl Iterator<Item = (u64, String)> {

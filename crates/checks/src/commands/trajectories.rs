@@ -4,7 +4,7 @@ use super::{Command, Each, Found, allowed_deviation, edges_in_sequence, nodes_in
 use crate::finding::quote;
 use tck_base::nurbs::{Curve, Flaw};
 use tck_check::{Check, CheckContext};
-use tck_view::{Edge, Member, Node, Trajectory};
+use tck_view::{Edge, Node};
 use tck_world::ordered::curve;
 use tck_world::{Listen, Topic};
 
@@ -42,10 +42,8 @@ fn shape(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> b
     let Some(order) = command.order() else { return false };
     let mut judged = false;
     for edge in edges_in_sequence(order) {
-        let flaws = match &edge.trajectory {
-            Member::Absent | Member::Null => continue,
-            Member::There(trajectory) => curve(trajectory).1,
-            Member::Other(_) => curve(&Trajectory::default()).1,
+        let Some((_, flaws)) = curve(&edge.trajectory) else {
+            continue;
         };
         judged = true;
         for flaw in flaws {
@@ -69,7 +67,7 @@ fn ends(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> bo
     }
     let mut judged = false;
     for (edge, around) in edges.iter().zip(nodes.windows(2)) {
-        let shape = edge.trajectory.there().and_then(|trajectory| curve(trajectory).0);
+        let shape = curve(&edge.trajectory).and_then(|(curve, _)| curve);
         let Some((start, end)) = shape.as_ref().and_then(Curve::ends) else {
             continue;
         };

@@ -2,7 +2,8 @@
 
 use super::found;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::{Fact, Listen, Observation, OrderedPlace, Pose, Topic};
+use tck_view::{Node, Pose, StateView};
+use tck_world::{Fact, Listen, Observation, OrderedPlace, Topic};
 
 /// `motion/axes`.
 pub(crate) const AXES: Check = Check {
@@ -14,7 +15,7 @@ pub(crate) const AXES: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
-    needs: &[],
+    needs: &[StateView::position, Node::node_position],
     start: |_| Box::new(Axes::default()),
 };
 
@@ -64,7 +65,7 @@ impl Running for Axes {
             .place
             .as_ref()
             .zip(now.pose.as_ref())
-            .filter(|(place, pose)| place.map == pose.map)
+            .filter(|(place, pose)| place.map == pose.map_id)
         else {
             return false;
         };

@@ -5,7 +5,8 @@ use serde_json::Value;
 use super::node_tolerance::margin;
 use super::{found, softly};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::{Fact, Lane, Listen, Observation, Pose, Topic};
+use tck_view::{Edge, FactsheetView, PhysicalParameters, Pose, StateView};
+use tck_world::{Fact, Lane, Listen, Observation, Topic};
 
 /// `motion/corridor`.
 pub(crate) const CORRIDOR: Check = Check {
@@ -17,7 +18,7 @@ pub(crate) const CORRIDOR: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
-    needs: &[],
+    needs: &[Edge::corridor, Edge::trajectory, StateView::position],
     start: |_| Box::new(Boundaries::of(Point::Centre)),
 };
 
@@ -30,7 +31,7 @@ pub(crate) const CORRIDOR_POINT: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
-    needs: &[],
+    needs: &[Edge::corridor, Edge::trajectory, StateView::position],
     start: |_| Box::new(Boundaries::of(Point::AsOrdered)),
 };
 
@@ -44,7 +45,7 @@ pub(crate) const NEXT_CORRIDOR: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
-    needs: &[],
+    needs: &[Edge::corridor, Edge::trajectory, StateView::position],
     start: |_| Box::new(NextCorridor),
 };
 
@@ -75,7 +76,8 @@ impl Boundaries {
 /// Half the width of the vehicle by its factsheet, in metres.
 fn half_width(context: &CheckContext<'_>) -> Option<f64> {
     let sheet = context.bindings.get("device")?.get("factsheet")?;
-    let width = sheet.pointer("/physicalParameters/width").and_then(Value::as_f64)?;
+    let path = [FactsheetView::physical_parameters, PhysicalParameters::width];
+    let width = context.pack.names().raw(sheet, &path).and_then(Value::as_f64)?;
     (0.0..100.0).contains(&width).then_some(width / 2.0)
 }
 

@@ -2,6 +2,7 @@
 
 use super::{TURNED, found, softly};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_view::{Edge, StateView};
 use tck_world::{Fact, Listen, Observation, Topic, apart, wrapped};
 
 /// `motion/trajectory`.
@@ -14,7 +15,7 @@ pub(crate) const TRAJECTORY: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
-    needs: &[],
+    needs: &[Edge::trajectory, StateView::position],
     start: |_| Box::new(Trajectory),
 };
 
@@ -29,7 +30,7 @@ pub(crate) const CURVE_ORIENTATION: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
-    needs: &[],
+    needs: &[Edge::trajectory, Edge::orientation, StateView::position],
     start: |_| Box::new(CurveOrientation),
 };
 

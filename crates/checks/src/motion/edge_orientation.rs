@@ -2,6 +2,7 @@
 
 use super::{TURNED, found, softly};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_view::{Edge, StateView};
 use tck_world::{Fact, Listen, Observation, Topic, apart};
 
 /// `motion/edge-orientation`.
@@ -16,7 +17,7 @@ pub(crate) const EDGE_ORIENTATION: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
-    needs: &[],
+    needs: &[Edge::orientation, StateView::position],
     start: |_| Box::new(EdgeOrientation),
 };
 

@@ -2,6 +2,7 @@
 
 use super::{SHARE, found, softly};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_view::{Edge, StateView};
 use tck_world::{Fact, Lane, Listen, Observation, Topic, View, apart};
 
 /// `motion/edge-rotation-speed`.
@@ -15,7 +16,7 @@ pub(crate) const EDGE_ROTATION_SPEED: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
-    needs: &[],
+    needs: &[Edge::max_rotation_speed, StateView::position],
     start: |_| Box::new(EdgeRotationSpeed::default()),
 };
 

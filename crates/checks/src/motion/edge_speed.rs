@@ -2,6 +2,7 @@
 
 use super::{SHARE, found, softly};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_view::{Edge, StateView};
 use tck_world::{AT_REST, Fact, Listen, Observation, Topic, View};
 
 /// `motion/edge-speed`.
@@ -14,7 +15,7 @@ pub(crate) const EDGE_SPEED: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
-    needs: &[],
+    needs: &[Edge::max_speed, StateView::position],
     start: |_| Box::new(EdgeSpeed::default()),
 };
 

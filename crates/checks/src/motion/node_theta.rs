@@ -3,6 +3,7 @@
 use super::node_tolerance::margin;
 use super::{TURNED, found, softly};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_view::{Node, StateView};
 use tck_world::{Fact, Listen, Observation, Topic, View, apart};
 
 /// `motion/node-theta`.
@@ -17,7 +18,7 @@ pub(crate) const NODE_THETA: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
-    needs: &[],
+    needs: &[Node::node_position, StateView::position],
     start: |_| Box::new(NodeTheta::default()),
 };
 
@@ -100,7 +101,7 @@ impl Running for NodeTheta {
         else {
             return false;
         };
-        let Some(theta) = place.theta.filter(|_| pose.map == place.map) else {
+        let Some(theta) = place.theta.filter(|_| pose.map_id == place.map) else {
             return false;
         };
         let allowed = place.deviation_theta.filter(|allowed| *allowed > 0.0).unwrap_or(USUAL);

@@ -2,6 +2,7 @@
 
 use super::softly;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_view::{Node, StateView};
 use tck_world::{Fact, Listen, Observation, Topic, View};
 
 /// `motion/node-tolerance`.
@@ -16,7 +17,7 @@ pub(crate) const NODE_TOLERANCE: Check = Check {
     arguments: &["tolerance"],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
-    needs: &[],
+    needs: &[Node::node_position, StateView::position],
     start: |context| {
         let stated = context.with.get("tolerance").and_then(serde_json::Value::as_f64);
         Box::new(NodeTolerance {
@@ -76,7 +77,7 @@ impl Running for NodeTolerance {
         else {
             return false;
         };
-        let Some(allowed) = place.deviation.filter(|_| pose.map == place.map) else {
+        let Some(allowed) = place.deviation.filter(|_| pose.map_id == place.map) else {
             return false;
         };
         let limit = allowed.max(self.usual) + SLACK;

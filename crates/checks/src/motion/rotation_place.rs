@@ -2,6 +2,7 @@
 
 use super::{TURNED, found};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_view::{Edge, StateView};
 use tck_world::{Fact, Listen, Observation, Topic, View, apart};
 
 /// `motion/rotation-place`.
@@ -14,7 +15,7 @@ pub(crate) const ROTATION_PLACE: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
-    needs: &[],
+    needs: &[Edge::rotation_allowed, StateView::position],
     start: |_| Box::new(RotationPlace::default()),
 };
 

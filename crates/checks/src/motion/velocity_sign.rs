@@ -2,6 +2,7 @@
 
 use super::found;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_view::StateView;
 use tck_world::{Fact, Listen, Observation, Topic, View, apart};
 
 /// `motion/velocity-sign`.
@@ -14,7 +15,7 @@ pub(crate) const VELOCITY_SIGN: Check = Check {
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
-    needs: &[],
+    needs: &[StateView::velocity, StateView::position],
     start: |_| Box::new(VelocitySign::default()),
 };
 

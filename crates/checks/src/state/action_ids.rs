@@ -4,15 +4,15 @@
 
 use std::collections::BTreeSet;
 
-use serde_json::Value;
-
 use crate::finding::{broken, quote};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_world::members::{actions, elements, text};
+use tck_view::{ActionView, StateView, Text};
 use tck_world::{Listen, Observation, Topic};
 
 /// How many actionIds are kept in mind, and how many of one message are looked at.
 const IDS: usize = 8192;
+/// Longer ones are not judged.
+const LONGEST: u64 = 1024;
 /// A shorter beginning may be a name of its own.
 const BEGINNING: usize = 8;
 
@@ -30,54 +30,54 @@ pub(crate) const ACTION_IDS: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[],
-    needs: &[],
+    needs: &[StateView::action_states],
     start: |_| Box::new(ActionIds::default()),
 };
 
 #[derive(Default)]
 struct ActionIds {
-    sent: BTreeSet<String>,
+    sent: BTreeSet<Text>,
     /// What a vehicle listed before any of this was sent may be of an earlier run.
-    old: BTreeSet<String>,
+    old: BTreeSet<Text>,
     unknown: bool,
     told: bool,
 }
 
 impl ActionIds {
     fn learn(&mut self, record: &Observation<'_>) {
-        let read = |action: &Value| text(action, "actionId").chars().take(1024).collect::<String>();
-        if let Some(order) = record.to_vehicle_json(Topic::Order) {
-            let all = elements(order, "nodes").chain(elements(order, "edges"));
-            let ids = all.flat_map(|element| elements(element, "actions")).map(read);
-            self.sent.extend(ids.take(IDS));
+        let read = |action: &ActionView| action.action_id.there().cloned().unwrap_or_default();
+        if let Some(order) = record.order_to_vehicle() {
+            self.sent
+                .extend(order.actions().map(|(_, action)| read(action)).take(IDS));
         }
-        if let Some(message) = record.to_vehicle_json(Topic::InstantActions) {
-            self.sent.extend(actions(message).map(read).take(IDS));
+        if let Some(message) = record.instant_actions_to_vehicle() {
+            self.sent.extend(message.all_actions().map(read).take(IDS));
         }
         self.unknown |= self.sent.len() > IDS;
     }
 
     /// The actionId that was sent and of which this one is only the beginning.
-    fn whole(&self, id: &str) -> Option<&String> {
-        let from = self.sent.range(id.to_owned()..);
-        from.take(1).find(|sent| sent.starts_with(id) && sent.as_str() != id)
+    fn whole(&self, id: &Text) -> Option<&Text> {
+        // Of a text that is not kept as a whole, the length tells whether it is the beginning.
+        let mut from = self.sent.range(id.clone()..);
+        from.next().filter(|sent| sent.starts_with(id.as_str()) && *sent != id)
     }
 }
 
 impl Running for ActionIds {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         self.learn(record);
-        let Some(state) = record.state_json() else {
+        let Some(state) = record.state() else {
             return false;
         };
-        let ids = elements(state, "actionStates").take(IDS);
-        let ids: Vec<&str> = ids.map(|action| text(action, "actionId")).collect();
+        let listed = state.all_action_states().take(IDS);
+        let ids = listed.filter_map(|action| action.action_id.there());
         if self.sent.is_empty() {
-            self.old = ids.into_iter().map(str::to_owned).collect();
+            self.old = ids.cloned().collect();
             return false;
         }
         let mut judged = false;
-        for id in ids.into_iter().filter(|id| id.len() >= BEGINNING && id.len() < 1024) {
+        for id in ids.filter(|id| id.len() >= BEGINNING && id.length() < LONGEST) {
             if self.unknown || self.old.contains(id) {
                 continue;
             }

@@ -3,11 +3,10 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use serde_json::Value;
-
-use crate::finding::{HEADER, broken};
+use crate::finding::broken;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_view::Print;
 use tck_world::{Listen, Observation, Topic};
 
 /// See the module.
@@ -36,23 +35,12 @@ pub(crate) const BURSTS: Check = Check {
 const BURST: usize = 5;
 /// … if they come within this time.
 const WITHIN: Duration = Duration::from_millis(250);
-/// What changes without being an event.
-const SILENT: [&str; 4] = ["agvPosition", "velocity", "batteryState", "distanceSinceLastNode"];
 
 #[derive(Default)]
 struct Bursts {
-    last: Option<Value>,
+    last: Option<Print>,
     /// Arrival and timestamp of the states equal to the last one.
     equal: VecDeque<(Moment, Option<jiff::Timestamp>)>,
-}
-
-/// A state without what changes all the time.
-fn essence(state: &Value) -> Value {
-    let mut rest = state.clone();
-    if let Some(members) = rest.as_object_mut() {
-        members.retain(|name, _| !HEADER.contains(&name.as_str()) && !SILENT.contains(&name.as_str()));
-    }
-    rest
 }
 
 impl Running for Bursts {
@@ -61,17 +49,13 @@ impl Running for Bursts {
         if asked || record.outside_influence() || record.lag().is_some() || record.link.disturbed {
             self.equal.clear();
         }
-        let Some(state) = record.state_json().filter(|_| !record.link.disturbed) else {
+        let Some(state) = record.state().filter(|_| !record.link.disturbed) else {
             return false;
         };
-        let now = essence(state);
-        if self.last.as_ref() != Some(&now) {
+        if self.last.replace(state.essence) != Some(state.essence) {
             self.equal.clear();
-            self.last = Some(now);
         }
-        let stamped: Option<jiff::Timestamp> = record
-            .state()
-            .and_then(|state| state.header.timestamp.or_empty().parse().ok());
+        let stamped: Option<jiff::Timestamp> = state.header.timestamp.or_empty().parse().ok();
         self.equal.push_back((record.at().moment, stamped));
         if self.equal.len() < BURST {
             return true;

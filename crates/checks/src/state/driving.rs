@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::finding::{broken, quote, show};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_view::{ActionState, Deviation, Member, Number, OrderView, Position, StateView};
+use tck_view::{ActionState, Deviation, Member, Number, OrderView, Pose, StateView};
 use tck_world::{Fact, Listen, Observation, Topic, last_node};
 
 /// Faster than this in a state without `driving` is no measuring noise, in metres and radians per second.
@@ -75,43 +75,15 @@ pub(crate) const POSITION_MOVES: Check = Check {
     start: |_| Box::new(PositionMoves::default()),
 };
 
-/// Where a vehicle says it is.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Pose {
-    pub map: String,
-    pub x: f64,
-    pub y: f64,
-    pub theta: f64,
+fn has_moved(from: &Pose, to: &Pose) -> bool {
+    let (far, turned) = from.apart(to);
+    from.map_id == to.map_id && (far > MOVED || turned > MOVED)
 }
 
-impl Pose {
-    /// The pose of a state or a visualization, where the vehicle knows it.
-    pub(crate) fn of(position: &Member<Position>) -> Option<Self> {
-        let position = position.there().filter(|position| !position.initialized.is(false))?;
-        Some(Self {
-            map: position.map_id.or_empty().to_owned(),
-            x: position.x.float()?,
-            y: position.y.float()?,
-            theta: position.theta.float()?,
-        })
-    }
-
-    /// How far apart two are: in metres, and in radians.
-    pub(crate) fn apart(&self, other: &Self) -> (f64, f64) {
-        let turned = (self.theta - other.theta).rem_euclid(std::f64::consts::TAU);
-        let turned = turned.min(std::f64::consts::TAU - turned);
-        ((self.x - other.x).hypot(self.y - other.y), turned)
-    }
-
-    fn moved(&self, other: &Self) -> bool {
-        let (far, turned) = self.apart(other);
-        self.map == other.map && (far > MOVED || turned > MOVED)
-    }
-
-    pub(crate) fn stays(&self, other: &Self) -> bool {
-        let (far, turned) = self.apart(other);
-        self.map == other.map && far < STILL && turned < STILL
-    }
+/// Whether a vehicle that was seen at two poses has stood still.
+pub(crate) fn stays(from: &Pose, to: &Pose) -> bool {
+    let (far, turned) = from.apart(to);
+    from.map_id == to.map_id && far < STILL && turned < STILL
 }
 
 /// Whether the vehicle is in command of itself and nothing holds it.
@@ -144,7 +116,7 @@ impl Driving {
     fn by_position(&mut self, state: &StateView, record: &Observation<'_>, findings: &mut Vec<CheckFinding>) {
         let now = record.at().moment;
         let driving = state.driving.flag();
-        let Some(pose) = Pose::of(&state.position).filter(|_| is_free(state) && driving.is_some()) else {
+        let Some(pose) = state.pose().filter(|_| is_free(state) && driving.is_some()) else {
             self.forget();
             return;
         };
@@ -159,7 +131,7 @@ impl Driving {
         let moved = before.is_some_and(|(at, before)| {
             let apart = now.since(at);
             let jumped = before.apart(&pose).0 > JUMP * apart.as_secs_f64().max(ONE_CYCLE.as_secs_f64());
-            apart <= CLOSE && !jumped && before.moved(&pose)
+            apart <= CLOSE && !jumped && has_moved(&before, &pose)
         });
         self.moves = if moved { self.moves + 1 } else { 0 };
         if self.moves >= 2 {
@@ -173,7 +145,7 @@ impl Driving {
         let now = record.at().moment;
         let nowhere = has_nowhere_to_go(state);
         match &mut self.resting {
-            Some((since, at, count)) if nowhere && at.stays(&pose) => {
+            Some((since, at, count)) if nowhere && stays(at, &pose) => {
                 *count += 1;
                 if now.since(*since) > COMING_TO_REST && *count > 2 {
                     let text = "driving is true, while the vehicle stands and has nowhere to go";
@@ -219,7 +191,7 @@ impl Running for Driving {
         }
         self.by_position(state, record, findings);
         if state.velocity.is_absent() {
-            return Pose::of(&state.position).is_some();
+            return state.pose().is_some();
         }
         let moving = state.velocity.there().is_some_and(|velocity| {
             let speeds = [&velocity.vx, &velocity.vy, &velocity.omega];
@@ -291,7 +263,7 @@ impl Running for PositionMoves {
         let Some(state) = record.state() else {
             return false;
         };
-        let (Some(pose), Some((node, _))) = (Pose::of(&state.position), last_node(state)) else {
+        let (Some(pose), Some((node, _))) = (state.pose(), last_node(state)) else {
             self.before = None;
             return false;
         };
@@ -321,7 +293,7 @@ impl Running for PositionMoves {
         let (Some(from), Some(to)) = (self.nodes.get(&last), self.nodes.get(&node)) else {
             return false;
         };
-        if from.0 != to.0 || pose.map != was.map || (from.1 - to.1).hypot(from.2 - to.2) < APART {
+        if from.0 != to.0 || pose.map_id != was.map_id || (from.1 - to.1).hypot(from.2 - to.2) < APART {
             return false;
         }
         self.stuck = if was.apart(&pose).0 < STILL { self.stuck + 1 } else { 0 };

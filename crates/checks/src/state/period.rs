@@ -14,7 +14,7 @@ use tck_base::pattern::whole;
 use tck_base::verdict::Verdict;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::{Event, Packet};
-use tck_view::MessageView;
+use tck_view::{ConnectionView, FactsheetView, MessageView, ProtocolLimits};
 use tck_world::{End, Listen, Observation, Topic};
 
 /// What the transport may add to an interval of the device.
@@ -45,7 +45,7 @@ pub(crate) const PERIOD: Check = Check {
         Listen::Delivered(Topic::Factsheet),
     ],
     reads: &[],
-    needs: &[],
+    needs: &[ConnectionView::connection_state],
     start: |_| Box::new(Period::default()),
 };
 
@@ -65,7 +65,7 @@ pub(crate) const OWN_LIMITS: Check = Check {
         Listen::Delivered(Topic::State),
     ],
     reads: &[],
-    needs: &[],
+    needs: &[FactsheetView::protocol_limits],
     start: |_| Box::new(OwnLimits::default()),
 };
 
@@ -143,15 +143,15 @@ impl Running for Period {
             match record.topic() {
                 Some(Topic::State) => _ = self.sent.get_or_insert(now.0),
                 // States do come. That they come elsewhere is one mistake, which `topic/names` names.
-                None if record.json().and_then(looks_like) == Some("state") => self.since = None,
+                None if looks_like(record) == Some(Topic::State) => self.since = None,
                 _ => {}
             }
         }
         let Some(message) = record.delivered() else {
             return false;
         };
-        match message.name {
-            "state" => {
+        match message.topic {
+            Topic::State => {
                 self.seen = true;
                 let judged = !record.link.disturbed && self.judge(&record.now(), now.1, context, findings);
                 self.since = (!record.link.disturbed).then_some(now);
@@ -159,9 +159,8 @@ impl Running for Period {
                 self.lag = Duration::ZERO;
                 judged
             }
-            "connection" => {
-                let connection = record.message().and_then(MessageView::connection);
-                let online = connection.is_some_and(|connection| connection.is_online());
+            Topic::Connection => {
+                let online = record.connection_message().is_some_and(|message| message.is_online());
                 if !online {
                     self.since = None;
                 } else if self.since.is_none() && !record.link.disturbed {
@@ -169,7 +168,7 @@ impl Running for Period {
                 }
                 false
             }
-            "factsheet" => {
+            Topic::Factsheet => {
                 let sheet = record.message().and_then(MessageView::factsheet);
                 let interval = sheet.and_then(|sheet| sheet.timing()?.default_state_interval.float());
                 self.own = interval
@@ -204,9 +203,11 @@ impl Running for OwnLimits {
             return false;
         };
         let Some(value) = record.json() else { return false };
-        match message.name {
-            "factsheet" => {
-                let limits = value.pointer("/protocolLimits/maxArrayLens").and_then(Value::as_object);
+        match message.topic {
+            Topic::Factsheet => {
+                // The factsheet gives the names of what is counted.
+                let path = [FactsheetView::protocol_limits, ProtocolLimits::max_array_lens];
+                let limits = record.names().raw(value, &path).and_then(Value::as_object);
                 self.arrays = limits
                     .into_iter()
                     .flatten()
@@ -214,16 +215,15 @@ impl Running for OwnLimits {
                     .take(64)
                     .map(|(name, limit)| (name.clone(), limit.clone()))
                     .collect();
-                let interval = value
-                    .pointer("/protocolLimits/timing/minStateInterval")
-                    .and_then(Value::as_f64);
+                let sheet = record.message().and_then(MessageView::factsheet);
+                let interval = sheet.and_then(|sheet| sheet.timing()?.min_state_interval.float());
                 // What no Duration can hold says nothing; what cannot be meant, such as milliseconds, is still judged.
                 self.interval = interval
                     .filter(|seconds| (0.0..=1e6).contains(seconds))
                     .map(Duration::from_secs_f64);
                 false
             }
-            "state" => {
+            Topic::State => {
                 for (name, limit) in &self.arrays {
                     let limit = whole(limit).filter(|limit| *limit > 0);
                     let length = name

@@ -99,7 +99,7 @@ impl Running for PositionRange {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         let of_state = record.state().and_then(|state| state.position.there());
         let shown = of_state.or_else(|| record.visualization()?.position.there());
-        let Some(position) = shown.filter(|position| !position.initialized.is(false)) else {
+        let Some(position) = shown.filter(|position| position.initialized.is(true)) else {
             return false;
         };
         if let Some(theta) = position.theta.float().filter(|theta| theta.abs() > PI + ROUNDING) {
