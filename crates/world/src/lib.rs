@@ -21,6 +21,7 @@ pub mod ordered;
 mod orders;
 mod pose;
 pub mod print;
+pub mod rest;
 mod restarts;
 mod setting;
 mod shown;
