@@ -32,7 +32,7 @@ pub fn audit(arguments: &Arguments) -> Result<Exit, Problem> {
     let not_written = |error: std::io::Error| Problem::Environment(format!("cannot write the tables: {error}"));
     let mut runs = Vec::new();
     let mut export = match &arguments.export {
-        Some(folder) => Some(Export::begin(folder).map_err(not_written)?),
+        Some(folder) => Some(Export::begin(folder, &library.rules.packs).map_err(not_written)?),
         None => None,
     };
     let mut result = crew::judged::<Problem>(&library.rules, &options, |crew| {

@@ -14,6 +14,7 @@ use tck_base::diagnostic::Diagnostic;
 use tck_judge::Library;
 use tck_net::bench::endpoint::{Access, Credentials, Endpoint};
 use tck_net::bench::tls::TlsFiles;
+use tck_pack::Packs;
 use tck_profile as profile;
 use tck_run::{Device, Heard, Wishes, draft, listen};
 
@@ -28,7 +29,8 @@ pub fn discover(arguments: &Discover) -> Result<Exit, Problem> {
             json!({ "format": "vda5050-tck.discovery/1", "devices": devices, "otherMessages": heard.others })
         ))?,
         Format::Text => {
-            let mut text: String = devices.iter().map(|device| describe(device)).collect();
+            let packs = &library.rules.packs;
+            let mut text: String = devices.iter().map(|device| describe(device, packs)).collect();
             if heard.others > 0 {
                 let _ = writeln!(text, "{} messages of no device were heard as well", heard.others);
             }
@@ -88,7 +90,7 @@ pub fn init(arguments: &Init) -> Result<Exit, Problem> {
     }
     super::print(&format!(
         "{}{shown} is written; next: vda5050-tck run --profile {shown} --plan\n",
-        describe(device)
+        describe(device, &library.rules.packs)
     ))
 }
 
@@ -192,7 +194,7 @@ fn choose(title: &str, devices: &[&Device]) -> Problem {
 }
 
 /// What was heard of a device, for people.
-fn describe(device: &Device) -> String {
+fn describe(device: &Device, packs: &Packs) -> String {
     let mut text = String::new();
     let _ = writeln!(
         text,
@@ -226,12 +228,10 @@ fn describe(device: &Device) -> String {
         );
         let _ = writeln!(text, "  position   {}", escaped(&place));
     }
-    let series = device.factsheet.as_ref().map(|sheet| {
-        let series = sheet.pointer("/typeSpecification/seriesName");
-        series
-            .and_then(serde_json::Value::as_str)
-            .unwrap_or("without a series name")
-    });
+    let sheet = device.sheet(packs);
+    let series = sheet
+        .as_ref()
+        .map(|sheet| sheet.series().unwrap_or("without a series name"));
     let _ = writeln!(text, "  factsheet  {}", escaped(series.unwrap_or("none was heard")));
     for remark in &device.remarks {
         let _ = writeln!(text, "  remark     {}", escaped(remark));

@@ -41,7 +41,7 @@ pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem
         return super::papers::attestation(folder, &library);
     }
     let path = file::find(folder);
-    let Recording { journal, torn } = journal_of(&path)?;
+    let Recording { mut journal, torn } = journal_of(&path)?;
     if torn {
         eprintln!("the last line of the journal is cut off, as after a crash; everything before it is used");
     }
@@ -53,6 +53,7 @@ pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem
     }
     unchanged(folder)?;
     let pack = super::pack(&library, Some(&result.protocol))?;
+    journal.set_names(pack.names());
     let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
     let root = write_all(
         &Bundle::open(folder),
@@ -108,7 +109,7 @@ fn message(folder: &Path, number: u64, format: Format) -> Result<Exit, Problem> 
     };
     super::print(&format!(
         "{}\n{:.3}\n{}\n",
-        headline::reference(Some(entry), number),
+        headline::reference(Some(&journal), number),
         entry.at().utc,
         clean::block(&shown.map_err(broken)?)
     ))

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use serde_json::Value;
-
 use tck_base::clock::Stamp;
 use tck_journal::Entry;
 use tck_journal::event::{Direction, Event, Record, Source};
+use tck_view::{MessageView, Names, StateView, Topic};
+use tck_world::rest::{has_order, open_actions};
 
 /// A message on its way through.
 pub(super) struct Arrived {
@@ -15,6 +15,13 @@ pub(super) struct Arrived {
     pub at: Stamp,
     pub stale: bool,
     pub entry: Arc<Entry>,
+}
+
+impl Arrived {
+    /// The message, if it is JSON.
+    pub fn message(&self, names: &Names) -> Option<&MessageView> {
+        self.entry.view(Topic::of_name(&self.name), names)
+    }
 }
 
 /// The record as the side that is judged is shown it: its own messages came, those of the other side were sent.
@@ -64,27 +71,17 @@ pub(super) fn of_side(arrived: &Arrived, own: bool, apart: i64) -> Arc<Entry> {
 }
 
 /// What a message says of its time.
-pub(super) fn timestamp(message: &Value) -> Option<jiff::Timestamp> {
-    message.get("timestamp")?.as_str()?.parse().ok()
+pub(super) fn timestamp(message: &MessageView) -> Option<jiff::Timestamp> {
+    message.header().timestamp.text()?.parse().ok()
 }
 
 /// What a message says of its version.
-pub(super) fn version(message: &Value) -> Option<String> {
-    let said = message.get("version")?.as_str()?;
+pub(super) fn version(message: &MessageView) -> Option<String> {
+    let said = message.header().version.text()?;
     Some(said.chars().take(32).collect())
 }
 
 /// Whether a state shows no order and no action that is still under way.
-pub(super) fn is_at_rest(state: &Value) -> bool {
-    let list = |member: &str| {
-        state
-            .get(member)
-            .and_then(Value::as_array)
-            .map_or(&[][..], Vec::as_slice)
-    };
-    let is_over = |action: &Value| {
-        let status = action.get("actionStatus").and_then(Value::as_str);
-        matches!(status, Some("FINISHED" | "FAILED"))
-    };
-    list("nodeStates").is_empty() && list("edgeStates").is_empty() && list("actionStates").iter().all(is_over)
+pub(super) fn is_at_rest(state: &StateView) -> bool {
+    !has_order(state) && open_actions(state).next().is_none()
 }

@@ -7,10 +7,8 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::time::Duration;
 
-use serde_json::Value;
-
 use tck_base::clock::Moment;
-use tck_base::pattern::whole;
+use tck_view::{ActionView, ErrorView, MessageView, Print, StateView};
 
 /// How many orders and actions are kept in mind.
 const SENT: usize = 8192;
@@ -64,8 +62,7 @@ fn print(what: impl Hash) -> u64 {
 #[derive(Debug)]
 struct Early {
     since: Moment,
-    /// Prints of its errors.
-    errors: BTreeSet<u64>,
+    errors: BTreeSet<Print>,
     /// Prints of the orders that were sent since.
     orders: BTreeSet<u64>,
 }
@@ -87,8 +84,8 @@ pub(super) struct Continuity {
 
 impl Continuity {
     /// Takes in a message that came live.
-    pub fn note(&mut self, name: &str, message: Option<&Value>, now: Moment) -> Step {
-        let id = message.and_then(|message| whole(message.get("headerId")?));
+    pub fn note(&mut self, name: &str, message: Option<&MessageView>, now: Moment) -> Step {
+        let id = message.and_then(|message| message.header().header_id.whole());
         if name == "connection" {
             // The count may begin anew on every topic of the vehicle.
             self.last
@@ -105,7 +102,7 @@ impl Continuity {
         };
         let step = match (counted, message) {
             (Step::Hole(since), _) => Step::Hole(since),
-            (step, Some(message)) if name == "state" && !self.explained(message) => {
+            (step, Some(MessageView::State(state))) if !self.explained(state) => {
                 Step::Hole(before.map_or(now, |(_, since)| since)).max_of(step)
             }
             (step, _) => step,
@@ -116,7 +113,7 @@ impl Continuity {
         let early = self.early.as_ref().map(|early| early.since);
         let step = match (step, early) {
             (Step::Hole(since), Some(early)) => Step::Hole(since.min(early)),
-            (step, Some(early)) if message.is_some_and(|message| self.was_under_way(name, message)) => {
+            (step, Some(early)) if message.is_some_and(|message| self.was_under_way(message)) => {
                 Step::Hole(early).max_of(step)
             }
             (step, _) => step,
@@ -124,8 +121,8 @@ impl Continuity {
         if let Step::Hole(_) = step {
             self.forget();
         }
-        self.learn(name, message);
-        if let Some(message) = message.filter(|_| matches!(name, "order" | "instantActions")) {
+        self.learn(message);
+        if let Some(message @ (MessageView::Order(_) | MessageView::InstantActions(_))) = message {
             let since = match &self.command {
                 Some((since, last, _)) if now.since(*last) <= CROSSING => *since,
                 _ => now,
@@ -137,16 +134,18 @@ impl Continuity {
 
     /// Since when it is not known what the master control had seen: a state came so soon after a command which it does not
     /// know that it may have been sent before.
-    pub fn crossed(&self, name: &str, message: Option<&Value>, now: Moment) -> Option<Moment> {
+    pub fn crossed(&self, message: Option<&MessageView>, now: Moment) -> Option<Moment> {
         let (since, last, marks) = self.command.as_ref()?;
-        let state = message.filter(|_| name == "state" && now.since(*last) <= CROSSING)?;
+        let state = message
+            .and_then(MessageView::state)
+            .filter(|_| now.since(*last) <= CROSSING)?;
         let mut known = shown(state).into_iter().chain(blamed(state));
         (!known.any(|print| marks.contains(&print))).then_some(*since)
     }
 
     /// Whether a message follows the last one of its topic by its count.
-    pub fn goes_on(&self, name: &str, message: &Value) -> bool {
-        let id = message.get("headerId").and_then(whole);
+    pub fn goes_on(&self, name: &str, message: &MessageView) -> bool {
+        let id = message.header().header_id.whole();
         let before = self.last.get(name).and_then(|(before, _)| *before);
         name != "connection" && before.is_some() && id == before.map(next)
     }
@@ -160,10 +159,10 @@ impl Continuity {
     }
 
     /// Judging begins at the first state of a recording, that was not seen to follow another one.
-    pub fn begins_early(&mut self, state: &Value, now: Moment) {
+    pub fn begins_early(&mut self, state: &StateView, now: Moment) {
         self.early = Some(Early {
             since: now,
-            errors: errors(state).map(|error| print(error.to_string())).collect(),
+            errors: state.errors.iter().map(|error| error.print).collect(),
             orders: BTreeSet::new(),
         });
     }
@@ -175,21 +174,20 @@ impl Continuity {
 
     /// Whether a message shows that something was under way when the recording began: an update of an order that was not
     /// seen, or an error about something that was not seen. The first state that shows nothing of the kind ends the doubt.
-    fn was_under_way(&mut self, name: &str, message: &Value) -> bool {
+    fn was_under_way(&mut self, message: &MessageView) -> bool {
         let Some(early) = &mut self.early else { return false };
-        match name {
-            "order" => {
-                let id = message.get("orderId").and_then(Value::as_str);
-                early.orders.extend(id.map(print));
-                message.get("orderUpdateId").and_then(whole) != Some(0)
+        match message {
+            MessageView::Order(order) => {
+                early.orders.extend(order.order_id.text().map(print));
+                order.order_update_id.whole() != Some(0)
             }
-            "state" => {
-                let is_known = |error: &&Value| early.errors.contains(&print(error.to_string()));
-                let is_about_sent = |error: &Value| {
+            MessageView::State(state) => {
+                let is_known = |error: &&ErrorView| early.errors.contains(&error.print);
+                let is_about_sent = |error: &ErrorView| {
                     let mut about = references(error);
                     about.any(|print| early.orders.contains(&print) || self.sent.has(print))
                 };
-                let mut new = errors(message).filter(|error| !is_known(error));
+                let mut new = state.errors.iter().filter(|error| !is_known(error));
                 let doubtful = new.any(|error| !is_about_sent(error));
                 self.early = None;
                 doubtful
@@ -206,41 +204,28 @@ impl Continuity {
     }
 
     /// Keeps in mind what was sent, and what is shown.
-    pub fn learn(&mut self, name: &str, message: Option<&Value>) {
-        match (name, message) {
-            ("order", Some(order)) => self.order(order),
-            ("instantActions", Some(message)) => self.actions(message, &["actions", "instantActions"]),
-            ("state", Some(state)) => self.shown = Some(shown(state)),
+    pub fn learn(&mut self, message: Option<&MessageView>) {
+        match message {
+            Some(MessageView::Order(order)) => {
+                let order_and_update = order.order_id.text().zip(order.order_update_id.whole());
+                order_and_update.into_iter().for_each(|both| self.sent.add(both));
+                self.actions(order.actions().map(|(_, action)| action));
+            }
+            Some(MessageView::InstantActions(message)) => self.actions(message.all_actions()),
+            Some(MessageView::State(state)) => self.shown = Some(shown(state)),
             _ => {}
         }
     }
 
     /// Whether all that a state shows beyond the one before was sent.
-    fn explained(&self, state: &Value) -> bool {
+    fn explained(&self, state: &StateView) -> bool {
         let Some(before) = &self.shown else { return true };
         shown(state).difference(before).all(|print| self.sent.has(*print))
     }
 
-    fn order(&mut self, order: &Value) {
-        let id = order.get("orderId").and_then(Value::as_str);
-        let update = order.get("orderUpdateId").and_then(whole);
-        if let (Some(id), Some(update)) = (id, update) {
-            self.sent.add((id, update));
-        }
-        for list in ["nodes", "edges"] {
-            for element in order.get(list).and_then(Value::as_array).into_iter().flatten() {
-                self.actions(element, &["actions"]);
-            }
-        }
-    }
-
-    fn actions(&mut self, holder: &Value, lists: &[&str]) {
-        for list in lists {
-            for action in holder.get(*list).and_then(Value::as_array).into_iter().flatten() {
-                if let Some(id) = action.get("actionId").and_then(Value::as_str) {
-                    self.sent.add(id);
-                }
-            }
+    fn actions<'m>(&mut self, actions: impl Iterator<Item = &'m ActionView>) {
+        for id in actions.filter_map(|action| action.action_id.text()) {
+            self.sent.add(id);
         }
     }
 }
@@ -261,59 +246,57 @@ fn next(id: u64) -> u64 {
 }
 
 /// Prints by which a state shows that it knows a command: its order, its actions, or an error about one of them.
-fn marks(message: &Value) -> BTreeSet<u64> {
-    let text = |holder: &Value, member: &str| holder.get(member).and_then(Value::as_str).map(str::to_owned);
-    let id = text(message, "orderId");
-    let update = message.get("orderUpdateId").and_then(whole);
-    let order = id.as_deref().zip(update).map(print);
-    let lists = ["actions", "instantActions"].into_iter();
-    let actions = lists.flat_map(|list| message.get(list).and_then(Value::as_array).into_iter().flatten());
-    let actions = actions.filter_map(|action| text(action, "actionId"));
-    let named = id.clone().into_iter().chain(actions);
-    let named: Vec<u64> = named.map(|name| print(name.as_str())).collect();
-    order.into_iter().chain(named).collect()
+fn marks(message: &MessageView) -> BTreeSet<u64> {
+    let mut all = BTreeSet::new();
+    if let Some(order) = message.order() {
+        let id = order.order_id.text();
+        all.extend(id.zip(order.order_update_id.whole()).map(print));
+        all.extend(id.map(print));
+    }
+    let actions = message
+        .instant_actions()
+        .into_iter()
+        .flat_map(|message| message.all_actions());
+    all.extend(actions.filter_map(|action| action.action_id.text().map(print)));
+    all
 }
 
 /// Prints of what the errors of a state refer to.
-fn blamed(state: &Value) -> Vec<u64> {
-    errors(state).flat_map(references).collect()
-}
-
-fn errors(state: &Value) -> impl Iterator<Item = &Value> {
-    state.get("errors").and_then(Value::as_array).into_iter().flatten()
+fn blamed(state: &StateView) -> impl Iterator<Item = u64> {
+    state.errors.iter().flat_map(references)
 }
 
 /// Prints of what an error refers to.
-fn references(error: &Value) -> impl Iterator<Item = u64> {
-    let all = error.get("errorReferences").and_then(Value::as_array);
-    let values = all.into_iter().flatten();
-    values.filter_map(|reference| Some(print(reference.get("referenceValue")?.as_str()?)))
+fn references(error: &ErrorView) -> impl Iterator<Item = u64> {
+    let all = error.error_references.iter();
+    all.filter_map(|reference| reference.value.text().map(print))
 }
 
 /// Prints of the order and of the actions that a state shows.
-fn shown(state: &Value) -> BTreeSet<u64> {
-    let id = state.get("orderId").and_then(Value::as_str).filter(|id| !id.is_empty());
-    let update = state.get("orderUpdateId").and_then(whole);
-    let order = id.zip(update).map(print);
+fn shown(state: &StateView) -> BTreeSet<u64> {
+    let id = state.order_id.text().filter(|id| !id.is_empty());
+    let order = id.zip(state.order_update_id.whole()).map(print);
     let actions = state
-        .get("actionStates")
-        .and_then(Value::as_array)
-        .into_iter()
-        .flatten();
-    let actions = actions.filter_map(|action| action.get("actionId").and_then(Value::as_str).map(print));
+        .all_action_states()
+        .filter_map(|action| action.action_id.text().map(print));
     order.into_iter().chain(actions).collect()
 }
 
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
+    use serde_json::{Value, json};
+    use tck_view::{Names, Topic};
 
     use super::*;
+
+    fn read(name: &str, message: &Value) -> MessageView {
+        MessageView::of_value(Topic::of_name(name), message, &Names::default())
+    }
 
     fn steps(messages: &[(&str, Value)]) -> Vec<Step> {
         let mut continuity = Continuity::default();
         let all = messages.iter().enumerate();
-        all.map(|(at, (name, value))| continuity.note(name, Some(value), Moment::from_micros(at as u64)))
+        all.map(|(at, (name, value))| continuity.note(name, Some(&read(name, value)), Moment::from_micros(at as u64)))
             .collect()
     }
 
@@ -345,8 +328,8 @@ mod tests {
         let at = |milliseconds: u64| Moment::from_micros(milliseconds * 1000);
         let crossed = |state: Value, milliseconds| {
             let mut continuity = Continuity::default();
-            continuity.note("order", Some(&order), at(10));
-            continuity.crossed("state", Some(&state), at(milliseconds))
+            continuity.note("order", Some(&read("order", &order)), at(10));
+            continuity.crossed(Some(&read("state", &state)), at(milliseconds))
         };
         let other = json!({ "orderId": "a", "orderUpdateId": 3 });
         assert_eq!(crossed(other.clone(), 60), Some(at(10)));

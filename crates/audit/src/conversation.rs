@@ -4,8 +4,6 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use serde_json::Value;
-
 use super::Scene;
 use super::arrived::{Arrived, is_at_rest, of_side, timestamp};
 use super::continuity::{Continuity, Step};
@@ -13,6 +11,7 @@ use super::result::SideResult;
 use super::side::{Apart, Side};
 use tck_base::clock::Moment;
 use tck_pack::{Pack, Role};
+use tck_view::MessageView;
 
 /// See the module.
 #[derive(Default)]
@@ -60,20 +59,19 @@ impl Conversation {
     }
 
     /// Whether a message follows the last one of its topic by its count.
-    pub fn goes_on(&self, name: &str, message: &Value) -> bool {
+    pub fn goes_on(&self, name: &str, message: &MessageView) -> bool {
         self.continuity.goes_on(name, message)
     }
 
     /// Shows a message to both sides.
     pub fn show(&mut self, arrived: &Arrived, scene: Scene<'_>) {
-        let Some(rule) = self.pack.as_ref().and_then(|pack| pack.topic(&arrived.name)) else {
-            return;
-        };
+        let Some(pack) = self.pack.clone() else { return };
+        let Some(rule) = pack.topic(&arrived.name) else { return };
         let publisher = rule.publisher;
-        let message = arrived.entry.json();
+        let message = arrived.message(pack.names());
         if !arrived.stale {
             let moment = arrived.at.moment;
-            if let Some(since) = self.continuity.crossed(&arrived.name, message, moment) {
+            if let Some(since) = self.continuity.crossed(message, moment) {
                 let commanding = self.sides.iter_mut().filter(|side| side.role == Role::MasterControl);
                 commanding.for_each(|side| side.broken(since, Apart::Crossed));
             }
@@ -92,12 +90,13 @@ impl Conversation {
             }
             // What was sent of an order before is not known: judging begins where none is under way.
             let is_first = step == Step::Begins && !self.began && self.continuity.holes == 0;
-            let may_begin = arrived.name == "state" && (step == Step::Follows || is_first);
-            let state = message.filter(|state| may_begin && is_at_rest(state));
+            let may_begin = step == Step::Follows || is_first;
+            let state = message.and_then(MessageView::state);
+            let state = state.filter(|state| may_begin && is_at_rest(state));
             if let Some(state) = state.filter(|_| self.sides.iter().any(|side| !side.watches())) {
                 self.began = true;
                 self.continuity.forget();
-                self.continuity.learn(&arrived.name, message);
+                self.continuity.learn(message);
                 if is_first {
                     self.continuity.begins_early(state, moment);
                 }

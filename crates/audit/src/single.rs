@@ -10,6 +10,7 @@ use tck_journal::{Entry, Payload};
 use tck_judge::{Rules, SideJudge};
 use tck_pack::Pack;
 use tck_suite::model::Recordings;
+use tck_view::Topic;
 
 /// What is wrong with a message.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,18 +49,17 @@ pub fn single(rules: &Rules, pack: &Pack, name: &str, payload: &Bytes) -> Vec<Fl
         event,
     );
     let message = Entry::new(draft.clone());
-    let text = |member: &str| {
-        let text = message.json().and_then(|message| message.get(member)?.as_str());
-        text.unwrap_or_default().to_owned()
-    };
+    let view = message.view(Topic::of_name(name), pack.names());
+    let said = view.map(|view| view.header().clone()).unwrap_or_default();
     // What its clock says cannot be held against anything.
     let at = Stamp {
         moment: Moment::START,
-        utc: text("timestamp").parse().unwrap_or_default(),
+        utc: said.timestamp.or_empty().parse().unwrap_or_default(),
     };
     let names = pack.topics().iter().map(|rule| rule.name.as_str());
     let topics = names.map(|name| (name.to_owned(), topic(name))).collect();
-    let header = header(publisher, pack, &text("manufacturer"), &text("serialNumber"), topics);
+    let (manufacturer, serial_number) = (said.manufacturer.or_empty(), said.serial_number.or_empty());
+    let header = header(publisher, pack, manufacturer, serial_number, topics);
     let Ok(mut judge) = SideJudge::begin(rules, &header, &|monitor| monitor.recordings == Recordings::Message) else {
         return Vec::new();
     };

@@ -12,7 +12,9 @@ use tck_capture::{Message, Place};
 use tck_journal::Payload;
 use tck_journal::event::{Event, Record, RunHeader, Source};
 use tck_judge::Rules;
+use tck_view::{MessageView, Names, Topic};
 
+use super::arrived::timestamp;
 use super::result::AuditResult;
 
 /// How often messages are judged again at most, counted in messages.
@@ -143,8 +145,8 @@ pub fn smallest(
 #[must_use]
 pub fn written(message: Message) -> Message {
     let said = || {
-        let value: serde_json::Value = serde_json::from_slice(&message.payload).ok()?;
-        value.get("timestamp")?.as_str()?.parse().ok()
+        let view = MessageView::of_slice(Topic::Other, &message.payload, &Names::default()).ok()?;
+        timestamp(&view)
     };
     Message {
         at: message.at.or_else(said).or(Some(jiff::Timestamp::UNIX_EPOCH)),

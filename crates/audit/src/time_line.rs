@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
-use serde_json::Value;
+use tck_view::MessageView;
 
 /// How many spans of one kind are kept; what follows is one span.
 const SPANS: usize = 200;
@@ -27,14 +27,13 @@ pub struct Span {
 pub struct TimeLine(pub BTreeMap<&'static str, Vec<Span>>);
 
 impl TimeLine {
-    /// Takes in a message of its topic of this name.
-    pub(super) fn note(&mut self, name: &str, message: &Value, at: jiff::Timestamp) {
-        let text = |member: &str| message.get(member).and_then(Value::as_str);
-        match name {
-            "connection" => self.say("connection", text("connectionState"), at),
-            "state" => {
-                self.say("mode", text("operatingMode"), at);
-                self.say("order", text("orderId").filter(|id| !id.is_empty()), at);
+    /// Takes in a message.
+    pub(super) fn note(&mut self, message: &MessageView, at: jiff::Timestamp) {
+        match message {
+            MessageView::Connection(said) => self.say("connection", said.connection_state.text(), at),
+            MessageView::State(state) => {
+                self.say("mode", state.operating_mode.text(), at);
+                self.say("order", state.order_id.text().filter(|id| !id.is_empty()), at);
             }
             _ => {}
         }
@@ -73,9 +72,14 @@ impl TimeLine {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
+    use serde_json::{Value, json};
+    use tck_view::{Names, Topic};
 
     use super::*;
+
+    fn read(topic: Topic, message: &Value) -> MessageView {
+        MessageView::of_value(topic, message, &Names::default())
+    }
 
     fn at(second: i64) -> jiff::Timestamp {
         jiff::Timestamp::from_second(1_767_225_600 + second).expect("time")
@@ -84,15 +88,13 @@ mod tests {
     #[test]
     fn what_stays_the_same_is_one_span() {
         let mut line = TimeLine::default();
-        line.note("connection", &json!({ "connectionState": "ONLINE" }), at(0));
+        let said = |state: &str| read(Topic::Connection, &json!({ "connectionState": state }));
+        line.note(&said("ONLINE"), at(0));
         for (second, order) in [(1, "a"), (2, "a"), (3, "b"), (4, "")] {
-            line.note(
-                "state",
-                &json!({ "operatingMode": "AUTOMATIC", "orderId": order }),
-                at(second),
-            );
+            let state = json!({ "operatingMode": "AUTOMATIC", "orderId": order });
+            line.note(&read(Topic::State, &state), at(second));
         }
-        line.note("connection", &json!({ "connectionState": "OFFLINE" }), at(5));
+        line.note(&said("OFFLINE"), at(5));
         let spans = |track: &str| -> Vec<(i64, i64, String)> {
             let since = |time: jiff::Timestamp| time.as_second() - 1_767_225_600;
             let all = line.0[track].iter();
@@ -111,7 +113,8 @@ mod tests {
     fn a_vehicle_of_many_orders_keeps_a_bounded_line() {
         let mut line = TimeLine::default();
         for second in 0..1_000 {
-            line.note("state", &json!({ "orderId": format!("order {second}") }), at(second));
+            let state = json!({ "orderId": format!("order {second}") });
+            line.note(&read(Topic::State, &state), at(second));
         }
         let orders = &line.0["order"];
         assert_eq!((orders.len(), orders[SPANS - 1].to), (SPANS, at(999)));

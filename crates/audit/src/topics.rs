@@ -82,16 +82,16 @@ impl Topics {
         if !self.names.contains(name.as_str()) {
             return None;
         }
-        let text = |part: &str| {
+        let level = |part: &str| {
             let part = found.name(part);
             part.map(|part| part.as_str().to_owned()).unwrap_or_default()
         };
         let around = (topic[..name.start()].to_owned(), topic[name.end()..].to_owned());
         Some(Named {
             key: format!("{}\n{}", around.0, around.1),
-            manufacturer: text("manufacturer"),
-            serial_number: text("serialNumber"),
-            major: text("majorVersion").parse().ok(),
+            manufacturer: level("manufacturer"),
+            serial_number: level("serialNumber"),
+            major: level("majorVersion").parse().ok(),
             name: name.as_str().to_owned(),
             around,
         })

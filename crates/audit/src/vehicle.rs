@@ -5,8 +5,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use serde_json::Value;
-
 use super::Scene;
 use super::arrival::{Known, Sorted};
 use super::arrived::{Arrived, timestamp, version};
@@ -19,11 +17,11 @@ use super::side::Side;
 use super::time_line::TimeLine;
 use super::topics::Named;
 use tck_base::clock::{Moment, Stamp};
-use tck_base::pattern::whole;
 use tck_capture::Message;
 use tck_journal::event::{Event, Record, RunHeader, Source};
 use tck_journal::{Entry, Payload};
 use tck_pack::{Pack, Role, Said};
+use tck_view::{MessageView, Names};
 
 /// How many messages wait until the vehicle has said which version it speaks.
 const WAITING: usize = 64;
@@ -103,31 +101,36 @@ impl Vehicle {
         }
         self.stale += u64::from(stale);
         let payload = Payload::keep(message.payload);
-        let draft = Entry::new(Record {
-            seq: number,
+        let mut arrived = Arrived {
+            number,
+            name: name.to_owned(),
             at: Stamp {
                 moment: self.now,
                 utc: message.at.unwrap_or_default(),
             },
-            source: Source::Link,
-            direction: None,
-            event: Event::Message {
-                topic: message.topic,
-                qos: message.qos.unwrap_or_default(),
-                retain: stale,
-                dup: false,
-                payload,
-            },
-        });
-        let at = self.stamp(message.at, draft.json());
-        let id = draft.json().and_then(|message| whole(message.get("headerId")?));
-        let arrived = Arrived {
-            number,
-            name: name.to_owned(),
-            at,
             stale,
-            entry: draft,
+            entry: Entry::new(Record {
+                seq: number,
+                at: Stamp {
+                    moment: self.now,
+                    utc: message.at.unwrap_or_default(),
+                },
+                source: Source::Link,
+                direction: None,
+                event: Event::Message {
+                    topic: message.topic,
+                    qos: message.qos.unwrap_or_default(),
+                    retain: stale,
+                    dup: false,
+                    payload,
+                },
+            }),
         };
+        let said = arrived.message(self.names(scene));
+        let id = said.and_then(|said| said.header().header_id.whole());
+        let stamped = (!self.timed).then(|| said.and_then(timestamp)).flatten();
+        let at = self.stamp(message.at, stamped);
+        arrived.at = at;
         let mut due = Vec::new();
         if self.timed {
             for sorted in self.sorted.values_mut() {
@@ -200,9 +203,8 @@ impl Vehicle {
     }
 
     /// When a message came. Without a time of the recorder, what the message says of itself has to do.
-    fn stamp(&mut self, recorded: Option<jiff::Timestamp>, message: Option<&Value>) -> Stamp {
-        let said = || message.and_then(timestamp);
-        let utc = if self.timed { recorded } else { said() };
+    fn stamp(&mut self, recorded: Option<jiff::Timestamp>, said: Option<jiff::Timestamp>) -> Stamp {
+        let utc = if self.timed { recorded } else { said };
         let origin = *self.origin.get_or_insert(utc.unwrap_or_default());
         let since = utc.map_or(0, |utc| utc.as_microsecond().saturating_sub(origin.as_microsecond()));
         let since = Moment::from_micros(u64::try_from(since).unwrap_or_default());
@@ -215,8 +217,8 @@ impl Vehicle {
 
     /// A message whose turn it is.
     fn pass(&mut self, arrived: Arrived, scene: Scene<'_>) {
-        if let Some(message) = arrived.entry.json().filter(|_| !arrived.stale) {
-            self.time_line.note(&arrived.name, message, arrived.at.utc);
+        if let Some(message) = arrived.message(self.names(scene)).filter(|_| !arrived.stale) {
+            self.time_line.note(message, arrived.at.utc);
         }
         if self.is_updated(&arrived, scene) {
             let concluded = self.conclude(scene);
@@ -244,7 +246,7 @@ impl Vehicle {
         if arrived.stale || is_command || is_told || self.earlier.len() >= STRETCHES {
             return false;
         }
-        let Some(message) = arrived.entry.json() else {
+        let Some(message) = arrived.message(self.names(scene)) else {
             return false;
         };
         let Some(said) = version(message) else { return false };
@@ -262,12 +264,15 @@ impl Vehicle {
 
     /// Finds the version, and judges what waited for it.
     fn settle(&mut self, scene: Scene<'_>, at_last: bool) {
+        let names = self.names(scene);
         let commands = |arrived: &&Arrived| matches!(arrived.name.as_str(), "order" | "instantActions");
         let (sent, said): (Vec<&Arrived>, Vec<&Arrived>) = self.waiting.iter().partition(commands);
         // What was stored may be from before a change of the vehicle's software.
         let lately = said.iter().filter(|arrived| at_last || !arrived.stale);
         let versions = lately.chain(sent.iter().filter(|_| at_last));
-        let versions: Vec<String> = versions.filter_map(|arrived| version(arrived.entry.json()?)).collect();
+        let versions: Vec<String> = versions
+            .filter_map(|arrived| version(arrived.message(names)?))
+            .collect();
         let Some(begun) = self.waiting.first().map(|first| first.at) else {
             return;
         };
@@ -289,7 +294,7 @@ impl Vehicle {
             (None, None, None) => return,
         };
         let pack = Arc::clone(pack);
-        self.identify();
+        self.identify(pack.names());
         let roles = [Role::Agv, Role::MasterControl];
         let sides = roles.map(|role| Side::begin(role, self.header(role, &pack), begun, self.timed, scene));
         self.conversation.begin(pack, sides.into_iter().flatten().collect());
@@ -299,19 +304,24 @@ impl Vehicle {
     }
 
     /// Where the topics do not say who the vehicle is, its messages do.
-    fn identify(&mut self) {
-        let said = self.waiting.iter().filter_map(|arrived| arrived.entry.json());
-        for message in said {
-            let text = |member: &str| message.get(member).and_then(Value::as_str).map(str::to_owned);
-            for (own, member) in [
-                (&mut self.manufacturer, "manufacturer"),
-                (&mut self.serial_number, "serialNumber"),
+    fn identify(&mut self, names: &Names) {
+        let said = self.waiting.iter().filter_map(|arrived| arrived.message(names));
+        for header in said.map(MessageView::header) {
+            for (own, said) in [
+                (&mut self.manufacturer, &header.manufacturer),
+                (&mut self.serial_number, &header.serial_number),
             ] {
                 if own.is_empty() {
-                    *own = text(member).unwrap_or_default();
+                    said.or_empty().clone_into(own);
                 }
             }
         }
+    }
+
+    /// What members of its messages are called: by the version it speaks, as far as that is known.
+    fn names<'s>(&'s self, scene: Scene<'s>) -> &'s Names {
+        let pack = self.conversation.pack();
+        pack.unwrap_or_else(|| scene.rules.packs.latest()).names()
     }
 
     fn header(&self, role: Role, pack: &Pack) -> RunHeader {

@@ -3,6 +3,7 @@
 //! Types are for what we send; what is sent wrong on purpose is made right first and then patched.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use serde_json::{Map, Value, json};
 
@@ -14,6 +15,7 @@ use tck_base::pattern::Bindings;
 use tck_judge::Ground;
 use tck_net::bench::Outgoing;
 use tck_suite::model::{Patch, Raw, Send, SendAction};
+use tck_view::{FactsheetView, OfferedAction, OrderView};
 
 /// A finished message and the actionIds in it, by the names given with `as`.
 #[derive(Debug)]
@@ -31,6 +33,8 @@ pub struct Composer {
     header_ids: BTreeMap<String, u32>,
     action_count: u64,
     ids: IdForm,
+    /// The factsheet of the device the message is for.
+    factsheet: Option<Arc<FactsheetView>>,
     orders: SentOrders,
 }
 
@@ -42,6 +46,7 @@ impl Composer {
             header_ids: BTreeMap::new(),
             action_count: 0,
             ids: IdForm::default(),
+            factsheet: None,
             orders: SentOrders::default(),
         }
     }
@@ -70,7 +75,8 @@ impl Composer {
             .get(&send.topic)
             .cloned()
             .ok_or_else(|| ComposeError::Topic(send.topic.clone()))?;
-        self.ids = IdForm::of(bindings.get("device.factsheet.protocolLimits.maxStringLens"));
+        self.factsheet = ground.factsheet();
+        self.ids = IdForm::of(self.factsheet.as_ref().and_then(|sheet| sheet.string_limits()));
         let rule = ground.pack.topic(&send.topic);
         let qos = send.qos.unwrap_or_else(|| rule.map_or(0, |rule| rule.qos));
         let mut actions = Vec::new();
@@ -139,7 +145,7 @@ impl Composer {
         if let Some(route) = &send.route {
             let said = payload
                 .as_ref()
-                .and_then(|payload| payload.get("orderId"))
+                .and_then(|payload| ground.pack.names().raw(payload, &[OrderView::order_id]))
                 .and_then(Value::as_str);
             let own = bindings.get("run.order").and_then(Value::as_str);
             let order = said.or(own).unwrap_or_default().to_owned();
@@ -210,7 +216,11 @@ impl Composer {
             let blocking = match blocking {
                 Some(said) if !instant => said,
                 // How an instant action blocks is nothing a test is about.
-                said => usual_blocking(&action_type, said.unwrap_or_else(|| json!("HARD")), bindings),
+                said => usual_blocking(
+                    &action_type,
+                    said.unwrap_or_else(|| json!("HARD")),
+                    self.factsheet.as_deref(),
+                ),
             };
             all.push(json!({
                 "actionType": action_type,
@@ -268,19 +278,17 @@ fn timestamp(now: Stamp) -> String {
 
 /// How an action blocks where a test does not care: the usual way, or the first type its factsheet lists when the usual
 /// one is not among them (FACT-15).
-fn usual_blocking(action_type: &Value, usual: Value, bindings: &Bindings) -> Value {
-    let listed = bindings
-        .get("device.factsheet.protocolFeatures.agvActions")
-        .and_then(Value::as_array);
-    let own = listed
-        .into_iter()
-        .flatten()
-        .find(|action| action.get("actionType") == Some(action_type))
-        .and_then(|action| action.get("blockingTypes")?.as_array());
-    match own {
-        Some(types) if !types.contains(&usual) => types.first().cloned().unwrap_or(usual),
-        _ => usual,
+fn usual_blocking(action_type: &Value, usual: Value, factsheet: Option<&FactsheetView>) -> Value {
+    let is_it =
+        |action: &&OfferedAction| action.action_type.is_there() && action.action_type.text() == action_type.as_str();
+    let own = factsheet.and_then(|sheet| sheet.offered_actions().find(is_it));
+    let Some(types) = own.map(|action| &action.blocking_types) else {
+        return usual;
+    };
+    if types.texts().any(|listed| Some(listed) == usual.as_str()) {
+        return usual;
     }
+    types.texts().next().map_or(usual, Value::from)
 }
 
 #[cfg(test)]

@@ -14,6 +14,9 @@ use tck_pack::Role;
 use tck_profile::show_duration;
 use tck_suite::model::{Section, Step, VehicleStep, Which};
 
+/// What the bindings of a run call the serial number of a vehicle.
+const SERIAL_NUMBER: &str = "serialNumber";
+
 impl<L: Link, O: Operator> Engine<L, O> {
     pub(super) async fn operate(
         &mut self,
@@ -26,7 +29,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
         let fleet = self.recorder.judge().ground().bindings.get("fleet").cloned();
         for vehicle in fleet.iter().filter_map(Value::as_array).flatten() {
             self.bind("each", vehicle.clone())?;
-            let serial = vehicle.get("serialNumber").and_then(Value::as_str).map(str::to_owned);
+            let serial = vehicle.get(SERIAL_NUMBER).and_then(Value::as_str).map(str::to_owned);
             let end = self.operate_once(operator, section, serial).await?;
             if end != StepEnd::Decided {
                 return Ok(end);

@@ -3,9 +3,7 @@
 //! They are readable, so that a person finds the test in a capture, unless the factsheet of the vehicle wants them short
 //! or of digits: FACT-12 binds the harness, too, while it plays the master control.
 
-use serde_json::Value;
-
-use tck_base::pattern::whole;
+use tck_view::StringLimits;
 
 /// A vehicle that takes ids of this length takes the readable ones.
 const READABLE: u64 = 64;
@@ -23,12 +21,12 @@ pub enum IdForm {
 }
 
 impl IdForm {
-    /// What `protocolLimits.maxStringLens` of a factsheet asks for.
+    /// What the limits of a factsheet ask for.
     #[must_use]
-    pub fn of(lengths: Option<&Value>) -> Self {
-        let member = |name: &str| lengths.and_then(|lengths| lengths.get(name));
-        let longest = member("idLen").and_then(whole).filter(|longest| *longest > 0);
-        let numerical = member("idNumericalOnly").and_then(Value::as_bool) == Some(true);
+    pub fn of(lengths: Option<&StringLimits>) -> Self {
+        let longest = lengths.and_then(|lengths| lengths.id_len.whole());
+        let longest = longest.filter(|longest| *longest > 0);
+        let numerical = lengths.is_some_and(|lengths| lengths.id_numerical_only.is(true));
         match longest.filter(|longest| *longest < READABLE) {
             Some(longest) => Self::Digits(usize::try_from(longest).unwrap_or(DIGITS).min(DIGITS)),
             None if numerical => Self::Digits(DIGITS),
@@ -74,17 +72,20 @@ fn last(id: &str, length: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
+    use serde_json::{Value, json};
+    use tck_view::{MessageView, Names, Topic};
+
+    fn of(lengths: &Value) -> IdForm {
+        let sheet = json!({ "protocolLimits": { "maxStringLens": lengths } });
+        let view = MessageView::of_value(Topic::Factsheet, &sheet, &Names::default());
+        IdForm::of(view.factsheet().unwrap().string_limits())
+    }
 
     #[test]
     fn ids_are_readable_unless_the_factsheet_wants_them_otherwise() {
-        for lengths in [
-            None,
-            Some(json!({})),
-            Some(json!({ "idLen": 0 })),
-            Some(json!({ "idLen": 64 })),
-        ] {
-            assert_eq!(IdForm::of(lengths.as_ref()), IdForm::Readable);
+        assert_eq!(IdForm::of(None), IdForm::Readable);
+        for lengths in [json!({}), json!({ "idLen": 0 }), json!({ "idLen": 64 })] {
+            assert_eq!(of(&lengths), IdForm::Readable);
         }
         assert_eq!(IdForm::Readable.of_name("seed3", 7, "order", 0), "seed3-7-order");
         assert_eq!(IdForm::Readable.of_action("seed3", 9), "seed3-action-9");
@@ -99,7 +100,7 @@ mod tests {
             json!({ "idLen": 8.0 }),
         ];
         for (lengths, length) in forms.iter().zip([12, 12, 8, 8]) {
-            let form = IdForm::of(Some(lengths));
+            let form = of(lengths);
             let ids = [
                 form.of_name("seed3", 7, "order", 0),
                 form.of_name("seed3", 7, "next", 1),

@@ -270,7 +270,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
         let judge = self.recorder.judge();
         let none = judge.ground().pack.word("emergencyStop.none");
         let state = judge.timeline().since("state", asked).last();
-        let stop = state.and_then(|entry| entry.json()?.pointer("/safetyState/eStop")?.as_str());
+        let stop = state.and_then(|entry| judge.timeline().state(entry)?.emergency_stop());
         stop.is_some() && stop == none
     }
 
@@ -378,10 +378,10 @@ impl<L: Link, O: Operator> Engine<L, O> {
     /// Waits until the vehicle may be sent another order: its factsheet says how much time it needs between two
     /// (`minOrderInterval`, FACT-13). One that asks for more than [`LONGEST_INTERVAL`] is not given more.
     async fn space_orders(&mut self) -> Result<(), EngineError> {
-        let bindings = &self.recorder.judge().ground().bindings;
-        let stated = bindings.get("device").and_then(|device| {
-            let seconds = device.pointer("/factsheet/protocolLimits/timing/minOrderInterval")?;
-            Duration::try_from_secs_f64(seconds.as_f64()?).ok()
+        let factsheet = self.recorder.judge().ground().factsheet();
+        let stated = factsheet.and_then(|sheet| {
+            let seconds = sheet.timing()?.min_order_interval.float()?;
+            Duration::try_from_secs_f64(seconds).ok()
         });
         let (Some(interval), Some(last)) = (stated, self.last_order) else {
             return Ok(());

@@ -56,6 +56,7 @@ impl Recorder {
         };
         judge.observe(&entry)?;
         guard.observe(&entry);
+        journal.set_names(judge.timeline().names());
         Ok(Self {
             journal,
             writer,

@@ -2,17 +2,17 @@
 
 use std::sync::Arc;
 
-use serde_json::Value;
-
 use tck_journal::Entry;
 use tck_judge::{RunJudge, client_of, number_of};
+use tck_view::Topic;
+use tck_world::rest;
 
 /// Whether the last state of the present connection shows no order and no motion. A device that never sent a state has
 /// shown no order either.
 #[must_use]
 pub fn is_idle(judge: &RunJudge) -> bool {
     match judge.state() {
-        Some(state) => is_without_order(&state),
+        Some(state) => rest::is_idle(&state),
         None => last_state(judge).is_none_or(|entry| entry.json().is_none()),
     }
 }
@@ -24,12 +24,8 @@ pub fn is_idle_since(judge: &RunJudge, seq: u64) -> bool {
         return false;
     }
     let Some(state) = judge.state() else { return false };
-    let actions = state.get("actionStates").and_then(Value::as_array);
-    let is_over = |action: &Value| {
-        let status = action.get("actionStatus").and_then(Value::as_str);
-        matches!(status, Some("FINISHED" | "FAILED"))
-    };
-    is_without_order(&state) && actions.is_some_and(|actions| actions.iter().all(is_over))
+    let has_done_all = state.action_states.is_there() && rest::open_actions(&state).next().is_none();
+    rest::is_idle(&state) && has_done_all
 }
 
 /// Whether a mock AGV has done everything it was sent: it is idle, no action is under way, and its last state is about
@@ -40,9 +36,13 @@ pub fn has_nothing_to_do(judge: &RunJudge) -> bool {
         return is_idle(judge);
     };
     let Some(state) = last_state(judge) else { return false };
-    let same =
-        |name: &str| order.json().and_then(|order| order.get(name)) == state.json().and_then(|state| state.get(name));
-    is_idle_since(judge, order.seq()) && same("orderId") && same("orderUpdateId")
+    let timeline = judge.timeline();
+    let sent = timeline.view(order, Topic::Order).and_then(|message| message.order());
+    let shown = timeline.state(state);
+    let same = sent.zip(shown).is_some_and(|(sent, shown)| {
+        (&sent.order_id, &sent.order_update_id) == (&shown.order_id, &shown.order_update_id)
+    });
+    is_idle_since(judge, order.seq()) && same
 }
 
 /// Whether any connection of the device that the tap has seen is open. A master control may have one for each vehicle.
@@ -82,10 +82,4 @@ pub fn has_open_connection(judge: &RunJudge) -> bool {
 
 fn last_state(judge: &RunJudge) -> Option<&Arc<Entry>> {
     judge.timeline().of("state").last()
-}
-
-fn is_without_order(state: &Value) -> bool {
-    let is_empty = |name: &str| state.get(name).and_then(Value::as_array).is_none_or(Vec::is_empty);
-    let is_driving = state.get("driving").and_then(Value::as_bool).unwrap_or(false);
-    is_empty("nodeStates") && is_empty("edgeStates") && !is_driving
 }

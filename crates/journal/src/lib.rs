@@ -150,6 +150,7 @@ impl Entry {
 #[derive(Clone, Debug, Default)]
 pub struct Journal {
     entries: Vec<Arc<Entry>>,
+    names: Arc<Names>,
 }
 
 impl Journal {
@@ -170,6 +171,17 @@ impl Journal {
     /// Takes over a record that already has its number, when reading a journal back.
     pub fn restore(&mut self, record: Record) {
         self.entries.push(Entry::new(record));
+    }
+
+    /// What the version of the run calls the members of messages; what 2.x calls them where nobody has said it.
+    #[must_use]
+    pub fn names(&self) -> &Names {
+        &self.names
+    }
+
+    /// Says what the version of the run calls the members of messages.
+    pub fn set_names(&mut self, names: &Arc<Names>) {
+        self.names = Arc::clone(names);
     }
 
     /// All records so far.

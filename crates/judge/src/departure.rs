@@ -3,6 +3,7 @@
 use super::gone::{Gone, Mark, Sign, ends};
 use tck_journal::Entry;
 use tck_journal::event::{Close, Event, LinkFault};
+use tck_view::Names;
 
 /// Watches the connection of the device through one test.
 #[derive(Debug, Default)]
@@ -16,7 +17,7 @@ pub(super) struct Departure {
 }
 
 impl Departure {
-    pub(super) fn observe(&mut self, entry: &Entry, subject: Option<&str>) {
+    pub(super) fn observe(&mut self, entry: &Entry, subject: Option<&str>, names: &Names) {
         let mark = (entry.seq(), entry.at().moment);
         match entry.event() {
             Event::Fault { fault } if !matches!(fault, LinkFault::Restore) => self.disturbed = true,
@@ -27,7 +28,7 @@ impl Departure {
                 ..
             } if !self.announced => self.leaves(Sign::Closed, mark),
             Event::Message { retain: false, .. } if subject == Some("connection") => {
-                if let Some(state) = ends(entry) {
+                if let Some(state) = ends(entry, names) {
                     self.leaves(Sign::Said(state), mark);
                 }
             }
@@ -71,7 +72,7 @@ mod tests {
                 direction: is_disconnect.then_some(Direction::FromDevice),
                 event: event.clone(),
             });
-            departure.observe(&entry, is_disconnect.then_some("mqtt/disconnect"));
+            departure.observe(&entry, is_disconnect.then_some("mqtt/disconnect"), &Names::default());
         }
         departure.story().map(Gone::to_string)
     }

@@ -8,6 +8,7 @@ use std::time::Duration;
 use tck_base::clock::Moment;
 use tck_journal::Entry;
 use tck_journal::event::{Event, LinkFault};
+use tck_view::{Names, Topic};
 
 /// By the standard no vehicle is silent for longer.
 const LONGEST: Duration = Duration::from_secs(31);
@@ -92,7 +93,7 @@ pub(super) struct Pulse {
 
 impl Pulse {
     /// Sees an entry with its subject.
-    pub(super) fn observe(&mut self, entry: &Entry, subject: Option<&str>) {
+    pub(super) fn observe(&mut self, entry: &Entry, subject: Option<&str>, names: &Names) {
         let mark = (entry.seq(), entry.at().moment);
         match entry.event() {
             Event::Fault { fault } if !matches!(fault, LinkFault::Restore) => self.disturbed = true,
@@ -103,7 +104,7 @@ impl Pulse {
             }
             // What the broker had stored is no word of the device.
             Event::Message { retain: true, .. } => {}
-            Event::Message { .. } if subject == Some("connection") => match ends(entry) {
+            Event::Message { .. } if subject == Some("connection") => match ends(entry, names) {
                 Some(_) if self.disturbed => {}
                 Some(state) => {
                     self.said.get_or_insert(Gone {
@@ -168,8 +169,12 @@ impl Pulse {
 const SPEAKS: [&str; 3] = ["state", "visualization", "factsheet"];
 
 /// What a connection message says, if it is that nobody is there.
-pub(super) fn ends(entry: &Entry) -> Option<String> {
-    let state = entry.json()?.get("connectionState")?.as_str()?;
+pub(super) fn ends(entry: &Entry, names: &Names) -> Option<String> {
+    let state = entry
+        .view(Topic::Connection, names)?
+        .connection()?
+        .connection_state
+        .text()?;
     ENDS.contains(&state).then(|| state.to_owned())
 }
 
@@ -215,7 +220,7 @@ mod tests {
                 direction: Some(Direction::FromDevice),
                 event,
             });
-            self.pulse.observe(&entry, subject);
+            self.pulse.observe(&entry, subject, &Names::default());
             entry.seq()
         }
 

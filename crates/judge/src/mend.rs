@@ -15,6 +15,7 @@ use tck_base::pattern::whole;
 use tck_journal::Entry;
 use tck_journal::event::{Event, Payload, Reading, Waiver};
 use tck_pack::RequirementId;
+use tck_view::{ActionState, EdgeState, Field, Member, Names, Node, NodeState, Number, OrderView, Position, StateView};
 
 /// The topic that is mended.
 const TOPIC: &str = "state";
@@ -57,7 +58,7 @@ impl Mends {
         }
         let Some(state) = entry.json() else { return false };
         let (mut state, mut used) =
-            mended(state, entry.seq(), scene.timeline, &self.waivers).unwrap_or_else(|| (state.clone(), Vec::new()));
+            mended(entry, scene.timeline, &self.waivers).unwrap_or_else(|| (state.clone(), Vec::new()));
         let mut fits = !used.is_empty() && takes(&state);
         if !fits && self.free && self.name_order_of_one_node(&mut state, entry, scene) {
             used.extend(self.waivers.iter().filter(|waiver| waiver.reading == Reading::Kept));
@@ -77,20 +78,24 @@ impl Mends {
             Event::Sent { topic, .. } if scene.topics.get("order") == Some(topic) => sent.json(),
             _ => None,
         });
-        let nodes = order.and_then(|order| order.get("nodes")?.as_array());
-        let (Some(order), Some([node])) = (order, nodes.map(Vec::as_slice)) else {
+        let names = scene.timeline.names();
+        let Some(order) = order else { return false };
+        let [node] = names.raw_elements(order, OrderView::nodes) else {
             return false;
         };
-        let waived = |name: &str| {
-            let mut all = self.waivers.iter();
-            all.any(|waiver| waiver.member == name && waiver.reading == Reading::Kept)
-        };
-        let forgot = waived("orderId") && is_nothing(entry.json().and_then(|state| state.get("orderId")));
-        if !forgot || node.get("nodeId") != state.get("lastNodeId") {
+        let shown = entry.json().and_then(|state| order_of(state, names));
+        let mut all = self.waivers.iter();
+        let forgot = all.any(|waiver| is_about(waiver, StateView::order_id, names) && waiver.reading == Reading::Kept);
+        let is_there = names.raw(node, &[Node::node_id]) == names.raw(state, &[StateView::last_node_id]);
+        if !forgot || !is_nothing(shown) || !is_there {
             return false;
         }
-        for name in ["orderId", "orderUpdateId"] {
-            if let (Some(value), Some(members)) = (order.get(name), state.as_object_mut()) {
+        for (sent, shown) in [
+            (OrderView::order_id, StateView::order_id),
+            (OrderView::order_update_id, StateView::order_update_id),
+        ] {
+            let value = names.raw(order, &[sent]).zip(names.name(shown));
+            if let (Some((value, name)), Some(members)) = (value, state.as_object_mut()) {
                 members.insert(name.to_owned(), value.clone());
             }
         }
@@ -105,7 +110,7 @@ impl Mends {
         if self.waivers.is_empty() || scene.topics.get(TOPIC) != Some(topic) || payload.bytes().len() > LARGEST {
             return None;
         }
-        let (state, used) = mended(entry.json()?, entry.seq(), scene.timeline, &self.waivers)?;
+        let (state, used) = mended(entry, scene.timeline, &self.waivers)?;
         let told = used.into_iter().map(|waiver| waiver.why.clone());
         self.used.borrow_mut().extend(told);
         let mut record = entry.record.clone();
@@ -126,10 +131,18 @@ impl Mends {
     }
 }
 
-/// Whether a state of an action is one that is not waited for any more.
-pub(super) fn is_lasting(action: &Value, waivers: &[Waiver]) -> bool {
+/// Whether a waiver is about this member of a state.
+fn is_about(waiver: &Waiver, member: Field, names: &Names) -> bool {
+    names.name(member) == Some(&waiver.member)
+}
+
+/// Whether the state of an action is one that is not waited for any more.
+pub(super) fn is_lasting(state: &Value, action: &str, waivers: &[Waiver], names: &Names) -> bool {
+    let mut all = names.raw_elements(state, StateView::action_states).iter();
+    let is_it = |one: &&Value| names.raw(one, &[ActionState::action_id]).and_then(Value::as_str) == Some(action);
+    let Some(action) = all.find(is_it) else { return false };
     waivers.iter().any(|waiver| match &waiver.reading {
-        Reading::Without { like } => waiver.member == "actionStates" && is_like(action, like),
+        Reading::Without { like } => is_about(waiver, StateView::action_states, names) && is_like(action, like),
         _ => false,
     })
 }
@@ -144,15 +157,17 @@ pub(super) fn status_meant<'w>(status: &str, waivers: &'w [Waiver]) -> Option<(&
 
 /// A state as it is meant, with the waivers that changed it; `None` when none did.
 pub(super) fn mended<'w>(
-    state: &Value,
-    seq: u64,
+    entry: &Entry,
     timeline: &Timeline,
     waivers: &'w [Waiver],
 ) -> Option<(Value, Vec<&'w Waiver>)> {
-    let mut meant = state.clone();
+    if waivers.is_empty() {
+        return None;
+    }
+    let mut meant = entry.json()?.clone();
     let mut used = Vec::new();
     for waiver in waivers {
-        if mend(&mut meant, state, seq, timeline, waiver).is_some() {
+        if mend(&mut meant, entry, timeline, waiver).is_some() {
             used.push(waiver);
         }
     }
@@ -160,13 +175,18 @@ pub(super) fn mended<'w>(
 }
 
 /// Mends one member; `None` when there is nothing to mend.
-fn mend(meant: &mut Value, state: &Value, seq: u64, timeline: &Timeline, waiver: &Waiver) -> Option<()> {
+fn mend(meant: &mut Value, entry: &Entry, timeline: &Timeline, waiver: &Waiver) -> Option<()> {
+    let (state, names) = (entry.json()?, timeline.names());
     let member = waiver.member.as_str();
     match &waiver.reading {
         Reading::Passed => {
-            let last = whole(state.get("lastNodeSequenceId")?)?;
+            let last = timeline.state(entry)?.last_node_sequence_id.whole()?;
+            let sequence = match is_about(waiver, StateView::edge_states, names) {
+                true => EdgeState::sequence_id,
+                false => NodeState::sequence_id,
+            };
             drop_elements(meant, member, |element| {
-                let at = element.get("sequenceId").and_then(whole);
+                let at = names.raw(element, &[sequence]).and_then(whole);
                 at.is_some_and(|at| at <= last)
             })
         }
@@ -180,10 +200,11 @@ fn mend(meant: &mut Value, state: &Value, seq: u64, timeline: &Timeline, waiver:
         }
         Reading::Status { shown, meant: word } => {
             let actions = meant.get_mut(member)?.as_array_mut()?;
+            let status = names.name(ActionState::action_status)?;
             let mut changed = None;
             for action in actions {
-                if action.get("actionStatus").and_then(Value::as_str) == Some(shown) {
-                    action["actionStatus"] = json!(word);
+                if action.get(status).and_then(Value::as_str) == Some(shown) {
+                    action[status] = json!(word);
                     changed = Some(());
                 }
             }
@@ -195,15 +216,16 @@ fn mend(meant: &mut Value, state: &Value, seq: u64, timeline: &Timeline, waiver:
             }
             // What holds on is what the order that was named last had, and never what an older one had. An order that is
             // named has forgotten nothing but what its own states have shown.
-            let named = state.get("orderId").filter(|name| !is_nothing(Some(*name)));
+            let earlier = || before(timeline, entry.seq()).filter_map(Entry::json);
+            let named = order_of(state, names).filter(|name| !is_nothing(Some(*name)));
             let of_order = |earlier: &&Value| match named {
-                Some(name) => earlier.get("orderId") == Some(name),
-                None => !is_nothing(earlier.get("orderId")),
+                Some(name) => order_of(earlier, names) == Some(name),
+                None => !is_nothing(order_of(earlier, names)),
             };
-            let order = before(timeline, seq).find(of_order)?.get("orderId")?;
-            let own = before(timeline, seq)
-                .skip_while(|earlier| earlier.get("orderId") != Some(order))
-                .take_while(|earlier| earlier.get("orderId") == Some(order));
+            let order = order_of(earlier().find(of_order)?, names)?;
+            let own = earlier()
+                .skip_while(|earlier| order_of(earlier, names) != Some(order))
+                .take_while(|earlier| order_of(earlier, names) == Some(order));
             let kept = own
                 .filter_map(|earlier| earlier.get(member))
                 .find(|one| !is_nothing(Some(*one)))?;
@@ -211,7 +233,8 @@ fn mend(meant: &mut Value, state: &Value, seq: u64, timeline: &Timeline, waiver:
             Some(())
         }
         Reading::Standing => {
-            if state.get(member) != Some(&json!(true)) || !stays(state, before(timeline, seq).next()?) {
+            let earlier = before(timeline, entry.seq()).find_map(|earlier| timeline.state(earlier))?;
+            if state.get(member) != Some(&json!(true)) || !stays(timeline.state(entry)?, earlier) {
                 return None;
             }
             meant.as_object_mut()?.insert(member.to_owned(), json!(false));
@@ -220,10 +243,15 @@ fn mend(meant: &mut Value, state: &Value, seq: u64, timeline: &Timeline, waiver:
     }
 }
 
-fn before(timeline: &Timeline, seq: u64) -> impl Iterator<Item = &Value> {
+fn before(timeline: &Timeline, seq: u64) -> impl Iterator<Item = &Entry> {
     let all = timeline.of(TOPIC);
     let earlier = &all[..all.partition_point(|entry| entry.seq() < seq)];
-    earlier.iter().rev().take(LOOK_BACK).filter_map(|entry| entry.json())
+    earlier.iter().rev().take(LOOK_BACK).map(AsRef::as_ref)
+}
+
+/// The orderId of a state, whatever it is.
+fn order_of<'v>(state: &'v Value, names: &Names) -> Option<&'v Value> {
+    names.raw(state, &[StateView::order_id])
 }
 
 fn drop_elements(meant: &mut Value, member: &str, drops: impl Fn(&Value) -> bool) -> Option<()> {
@@ -251,13 +279,15 @@ fn is_like(element: &Value, like: &Value) -> bool {
 }
 
 /// Whether two states show the vehicle at one place.
-pub(super) fn stays(one: &Value, other: &Value) -> bool {
-    let at = |state: &Value, path: &str| state.pointer(path).and_then(Value::as_f64);
-    let same = |path: &str| match (at(one, path), at(other, path)) {
-        (Some(one), Some(other)) => (one - other).abs() < SAME_PLACE,
-        _ => false,
-    };
-    same("/agvPosition/x") && same("/agvPosition/y") && same("/agvPosition/theta")
+fn stays(one: &StateView, other: &StateView) -> bool {
+    let positions = one.position.there().zip(other.position.there());
+    positions.is_some_and(|(one, other)| {
+        let same = |of: fn(&Position) -> &Member<Number>| match (of(one).float(), of(other).float()) {
+            (Some(one), Some(other)) => (one - other).abs() < SAME_PLACE,
+            _ => false,
+        };
+        same(|at| &at.x) && same(|at| &at.y) && same(|at| &at.theta)
+    })
 }
 
 #[cfg(test)]
@@ -268,6 +298,7 @@ mod tests {
     use tck_base::clock::{Moment, Stamp};
     use tck_journal::Journal;
     use tck_journal::event::{Occurrence, Source};
+    use tck_pack::{Assets, Packs};
 
     fn waiver(member: &str, reading: Reading) -> Waiver {
         Waiver {
@@ -280,7 +311,9 @@ mod tests {
 
     fn after(states: &[Value]) -> (Timeline, Arc<Entry>) {
         let mut journal = Journal::new();
-        let mut timeline = Timeline::new(&BTreeMap::from([(TOPIC.to_owned(), TOPIC.to_owned())]));
+        let packs = Packs::load(&Assets::of_source_tree().unwrap()).unwrap();
+        let topics = BTreeMap::from([(TOPIC.to_owned(), TOPIC.to_owned())]);
+        let mut timeline = Timeline::new(&topics, packs.latest());
         let mut last = None;
         for state in states {
             let entry = journal.append(Occurrence {
@@ -307,7 +340,7 @@ mod tests {
     fn read(states: &[Value], reading: Reading, member: &str) -> Option<Value> {
         let (timeline, last) = after(states);
         let waivers = [waiver(member, reading)];
-        let (state, _) = mended(last.json()?, last.seq(), &timeline, &waivers)?;
+        let (state, _) = mended(&last, &timeline, &waivers)?;
         state.get(member).cloned()
     }
 
@@ -361,7 +394,7 @@ mod tests {
         let makes_up = |id: &str| {
             let id = RequirementId::from(id);
             let mends = Mends::of(&waivers, TOPIC, &[&id]);
-            let read = mended(last.json().unwrap(), last.seq(), &timeline, &mends.waivers);
+            let read = mended(&last, &timeline, &mends.waivers);
             read.is_some_and(|(state, _)| is_empty(&state))
         };
         assert!(!makes_up("STATE-13"));

@@ -35,6 +35,7 @@ use tck_journal::event::{Event, Occurrence, Plan, Reading, RunHeader, Waiver};
 use tck_pack::Role;
 use tck_result::{Repetition, TestResult};
 use tck_suite::model::{Monitor, Test};
+use tck_view::{MessageView, StateView, Topic};
 
 /// Why a run without an end is over.
 const BREAKS_OFF: &str = "the journal breaks off here";
@@ -98,9 +99,9 @@ impl RunJudge {
         let unheard = is_unseen.then(|| Unheard::of(&ground.topics, &ground.pack));
         let company = Company::of(role, &header, &ground.pack);
         let timeline = if header.vehicles.is_empty() {
-            Timeline::new(&header.topics)
+            Timeline::new(&header.topics, &ground.pack)
         } else {
-            Timeline::of_vehicles(&header.vehicles)
+            Timeline::of_vehicles(&header.vehicles, &ground.pack)
         };
         Ok(Self {
             rules: rules.clone(),
@@ -248,18 +249,21 @@ impl RunJudge {
         let Event::Sent { topic, .. } = entry.event() else {
             return;
         };
-        if self.ground.topics.get("order") == Some(topic) {
-            let id = entry.json().and_then(|order| order.get("orderId")?.as_str());
+        let topics = &self.ground.topics;
+        let name = topics.iter().find_map(|(name, full)| (full == topic).then_some(name));
+        let topic = name.map_or(Topic::Other, |name| Topic::of_name(name));
+        let message = self.timeline.view(entry, topic);
+        if topic == Topic::Order {
+            let id = message.and_then(|message| message.order()?.order_id.text());
             self.last_order = id.map(|id| (entry.at().moment, id.to_owned()));
         }
-        if self.ground.topics.get("instantActions") != Some(topic) {
-            return;
-        }
-        let actions = entry.json().and_then(|message| message.get("actions")?.as_array());
-        for action in actions.into_iter().flatten() {
-            let text = |name: &str| action.get(name).and_then(Value::as_str).map(str::to_owned);
-            if let (Some(id), Some(kind)) = (text("actionId"), text("actionType")) {
-                self.instants.insert(id, kind);
+        for action in message
+            .and_then(MessageView::instant_actions)
+            .iter()
+            .flat_map(|all| &all.actions)
+        {
+            if let (Some(id), Some(kind)) = (action.action_id.text(), action.action_type.text()) {
+                self.instants.insert(id.to_owned(), kind.to_owned());
             }
         }
     }
@@ -298,12 +302,21 @@ impl RunJudge {
     }
 
     /// What the vehicle says of itself: the last state of its present connection, read as it is meant.
-    pub fn state(&self) -> Option<Cow<'_, Value>> {
+    pub fn state(&self) -> Option<Arc<StateView>> {
         let entry = self.timeline.present("state")?;
-        let state = entry.json()?;
-        Some(match mended(state, entry.seq(), &self.timeline, &self.ground.waivers) {
+        let Some((meant, _)) = mended(entry, &self.timeline, &self.ground.waivers) else {
+            return self.timeline.state(entry).map(Arc::clone);
+        };
+        let meant = MessageView::of_value(Topic::State, &meant, self.timeline.names());
+        meant.state().map(Arc::clone)
+    }
+
+    /// The JSON of what [`RunJudge::state`] shows, to quote it.
+    pub fn state_json(&self) -> Option<Cow<'_, Value>> {
+        let entry = self.timeline.present("state")?;
+        Some(match mended(entry, &self.timeline, &self.ground.waivers) {
             Some((meant, _)) => Cow::Owned(meant),
-            None => Cow::Borrowed(state),
+            None => Cow::Borrowed(entry.json()?),
         })
     }
 

@@ -38,9 +38,9 @@ impl SideJudge {
             .filter(|monitor| monitor.device.is_none_or(|device| device == role) && wanted(monitor))
             .collect();
         let timeline = if header.vehicles.is_empty() {
-            Timeline::new(&header.topics)
+            Timeline::new(&header.topics, &ground.pack)
         } else {
-            Timeline::of_vehicles(&header.vehicles)
+            Timeline::of_vehicles(&header.vehicles, &ground.pack)
         };
         Ok(Self {
             watches: Watches::begin(&monitors, &ground, vehicles, header.vantage == "tap"),

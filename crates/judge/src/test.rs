@@ -27,6 +27,7 @@ use tck_journal::{Entry, Reason};
 use tck_pack::{Catalogue, Pack, Role};
 use tck_result::{Decision, StepResult, TestResult, Waited};
 use tck_suite::model::{Section, Step, Test, Verb};
+use tck_view::{FactsheetView, MessageView, Topic};
 use tck_world::Setting;
 
 /// What does not change during a run.
@@ -56,6 +57,19 @@ pub struct Ground {
 }
 
 impl Ground {
+    /// The factsheet of the device, where the run knows it, as it was published.
+    #[must_use]
+    pub fn factsheet_json(&self) -> Option<&Value> {
+        self.bindings.get("device")?.get("factsheet")
+    }
+
+    /// The factsheet of the device, where the run knows it.
+    #[must_use]
+    pub fn factsheet(&self) -> Option<Arc<FactsheetView>> {
+        let message = MessageView::of_value(Topic::Factsheet, self.factsheet_json()?, self.pack.names());
+        message.factsheet().map(Arc::clone)
+    }
+
     /// What monitors and facts may know besides the records.
     pub(super) fn setting(&self) -> Setting<'_> {
         Setting {
@@ -218,7 +232,7 @@ impl TestJudge {
     /// Shows it one entry. The timeline already holds it.
     pub fn observe(&mut self, entry: &Arc<Entry>, subject: Option<&str>, timeline: &Timeline, ground: &Ground) {
         self.entries.push(Arc::clone(entry));
-        self.departure.observe(entry, subject);
+        self.departure.observe(entry, subject, ground.pack.names());
         if let Some(span) = &mut self.result.journal {
             span.1 = entry.seq();
         }

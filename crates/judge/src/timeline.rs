@@ -17,6 +17,8 @@ use super::gone::{Gone, Pulse};
 use tck_base::clock::{Moment, Stamp};
 use tck_journal::Entry;
 use tck_journal::event::{Direction, Event, MockVehicle, Packet};
+use tck_pack::Pack;
+use tck_view::{MessageView, Names, StateView, Topic};
 
 /// How the subjects of the second mock AGV end: `order@second`.
 pub const OF_SECOND: &str = "@second";
@@ -42,27 +44,31 @@ pub struct Timeline {
     last: Option<Stamp>,
     /// Of a vehicle under test.
     pulse: Pulse,
+    /// What the version calls the members of messages.
+    names: Arc<Names>,
 }
 
 impl Timeline {
     /// An empty index for these full topics by topic name, of an AGV under test.
     #[must_use]
-    pub fn new(topics: &BTreeMap<String, String>) -> Self {
+    pub fn new(topics: &BTreeMap<String, String>, pack: &Pack) -> Self {
         Self {
             topics: places(topics, 0).collect(),
+            names: Arc::clone(pack.names()),
             ..Self::default()
         }
     }
 
     /// An empty index for the mock AGVs that a master control is tested with.
     #[must_use]
-    pub fn of_vehicles(vehicles: &[MockVehicle]) -> Self {
+    pub fn of_vehicles(vehicles: &[MockVehicle], pack: &Pack) -> Self {
         let all = vehicles.iter().enumerate();
         Self {
             topics: all
                 .flat_map(|(number, vehicle)| places(&vehicle.topics, number))
                 .collect(),
             own: true,
+            names: Arc::clone(pack.names()),
             ..Self::default()
         }
     }
@@ -77,7 +83,7 @@ impl Timeline {
         }
         let subject = self.subject_of(entry);
         if !self.own {
-            self.pulse.observe(entry, subject.as_deref());
+            self.pulse.observe(entry, subject.as_deref(), &self.names);
         }
         let subject = subject?;
         self.subjects
@@ -156,6 +162,30 @@ impl Timeline {
             return None;
         };
         self.topics.get(topic)
+    }
+
+    /// What the version calls the members of messages.
+    #[must_use]
+    pub fn names(&self) -> &Arc<Names> {
+        &self.names
+    }
+
+    /// An entry as a message of a topic, if it is one.
+    #[must_use]
+    pub fn view<'e>(&self, entry: &'e Entry, topic: Topic) -> Option<&'e MessageView> {
+        entry.view(topic, &self.names)
+    }
+
+    /// An entry as a state, if it is a message that can be read as one.
+    #[must_use]
+    pub fn state<'e>(&self, entry: &'e Entry) -> Option<&'e Arc<StateView>> {
+        self.view(entry, Topic::State)?.state()
+    }
+
+    /// The states, from the last one back to the first, with the entry of each.
+    pub fn states_back(&self) -> impl Iterator<Item = (&Arc<Entry>, &Arc<StateView>)> {
+        let all = self.of("state").iter().rev();
+        all.filter_map(|entry| Some((entry, self.state(entry)?)))
     }
 
     /// All entries of a subject.
@@ -285,6 +315,7 @@ mod tests {
     use crate::step::Timing;
     use tck_journal::Journal;
     use tck_journal::event::{Occurrence, Payload, Source};
+    use tck_pack::{Assets, Packs};
 
     fn at(millis: u64) -> Moment {
         Moment::from_micros(millis * 1_000)
@@ -293,7 +324,7 @@ mod tests {
     /// A timeline in which the harness was held up so long until then, in milliseconds.
     fn held_up(all: &[(u64, u64)]) -> Timeline {
         let mut journal = Journal::new();
-        let mut timeline = Timeline::new(&BTreeMap::new());
+        let mut timeline = Timeline::default();
         for (until, long) in all {
             let occurrence = Occurrence {
                 at: Stamp {
@@ -385,7 +416,10 @@ mod tests {
     #[test]
     fn a_state_counts_from_the_present_connection_of_the_client_that_publishes() {
         let mut journal = Journal::new();
-        let mut timeline = Timeline::new(&BTreeMap::from([("state".to_owned(), "state".to_owned())]));
+        let mut timeline = Timeline::new(
+            &BTreeMap::from([("state".to_owned(), "state".to_owned())]),
+            Packs::load(&Assets::of_source_tree().unwrap()).unwrap().latest(),
+        );
         let mut show = |timeline: &mut Timeline, all: &[Occurrence]| {
             for occurrence in all {
                 timeline.add(&journal.append(occurrence.clone()));

@@ -8,12 +8,11 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
-use serde_json::Value;
-
 use tck_base::clock::Moment;
 use tck_journal::Entry;
 use tck_journal::event::Event;
 use tck_pack::{Pack, Role};
+use tck_view::{ErrorView, Header, Member, MessageView, Names, StateView, Topic};
 
 /// So many ids of a topic are looked for.
 const KEPT: usize = 64;
@@ -34,17 +33,16 @@ struct Commands {
 
 impl Commands {
     /// Whether this new error is about what was sent here: it names it, or is of a kind that was not there and comes soon.
-    fn is_answered_by(&self, error: &Value, soon: Option<Moment>) -> bool {
+    fn is_answered_by(&self, error: &ErrorView, soon: Option<Moment>, names: &Names) -> bool {
         let Some((sent, header)) = &self.last else { return false };
-        let references = error.get("errorReferences").and_then(Value::as_array);
-        let named = references.into_iter().flatten().any(|reference| {
-            let text = |name: &str| reference.get(name).and_then(Value::as_str);
-            match text("referenceKey") {
-                Some("topic") => {
-                    text("referenceValue").is_some_and(|topic| topic.rsplit('/').next() == Some(&self.name))
-                }
-                Some("headerId") => header.is_some() && text("referenceValue") == header.as_deref(),
-                _ => false,
+        let by_header = names.name(Header::header_id);
+        let named = error.error_references.iter().any(|reference| {
+            let key = reference.key.text();
+            if key == Some("topic") {
+                let topic = reference.value.text();
+                topic.is_some_and(|topic| topic.rsplit('/').next() == Some(&self.name))
+            } else {
+                key.is_some() && key == by_header && header.is_some() && reference.value.text() == header.as_deref()
             }
         });
         named || soon.is_some_and(|at| at.since(*sent) <= SOON)
@@ -56,9 +54,10 @@ impl Commands {
 pub(super) struct Unheard {
     /// By full topic on which the device is commanded, as long as it has shown nothing.
     sent: BTreeMap<String, Commands>,
-    /// The topic of the states, and the errors of the last one.
+    /// The topic of the states, and the last one.
     state: Option<String>,
-    errors: Vec<Value>,
+    last: Option<Arc<StateView>>,
+    names: Arc<Names>,
     /// On which topics that is, of those on which the running test has sent something.
     of_test: Vec<String>,
 }
@@ -78,7 +77,8 @@ impl Unheard {
                 })
                 .collect(),
             state: topics.get("state").cloned(),
-            errors: Vec::new(),
+            last: None,
+            names: Arc::clone(pack.names()),
             of_test: Vec::new(),
         }
     }
@@ -89,11 +89,13 @@ impl Unheard {
             Event::TestBegun { .. } => self.of_test.clear(),
             Event::Sent { topic, .. } => {
                 if let Some(sent) = self.sent.get_mut(topic) {
-                    sent.ids.extend(ids(entry.json()));
+                    let message = entry.view(Topic::of_name(&sent.name), &self.names);
+                    sent.ids.extend(message.map(ids).into_iter().flatten());
                     let old = sent.ids.len().saturating_sub(KEPT);
                     sent.ids.drain(..old);
-                    let header = entry.json().and_then(|message| message.get("headerId"));
-                    sent.last = Some((entry.at().moment, header.map(Value::to_string)));
+                    let header = message.map(|message| &message.header().header_id);
+                    let header = header.filter(|header| !header.is_absent());
+                    sent.last = Some((entry.at().moment, header.map(Member::to_string)));
                     if !self.of_test.contains(topic) {
                         self.of_test.push(topic.clone());
                     }
@@ -115,16 +117,16 @@ impl Unheard {
 
     /// Looks for errors that were not there before.
     fn errors_of(&mut self, entry: &Entry, stored: bool) {
-        let errors = entry.json().and_then(|state| state.get("errors")?.as_array());
-        let errors = errors.cloned().unwrap_or_default();
+        let state = entry.view(Topic::State, &self.names).and_then(MessageView::state);
         let at = entry.at().moment;
-        for new in errors.iter().filter(|error| !stored && !self.errors.contains(error)) {
-            let kind = new.get("errorType");
-            let is_known = self.errors.iter().any(|old| old.get("errorType") == kind);
+        let known = || self.last.iter().flat_map(|state| &state.errors);
+        let now = state.into_iter().flat_map(|state| &state.errors);
+        for new in now.filter(|error| !stored && !known().any(|old| old.print == error.print)) {
+            let is_known = known().any(|old| old.error_type == new.error_type);
             let soon = (!is_known).then_some(at);
-            self.sent.retain(|_, sent| !sent.is_answered_by(new, soon));
+            self.sent.retain(|_, sent| !sent.is_answered_by(new, soon, &self.names));
         }
-        self.errors = errors;
+        self.last = state.map(Arc::clone);
     }
 
     /// Why nothing can be said of what the device did not do in the running test.
@@ -139,17 +141,14 @@ impl Unheard {
 }
 
 /// What a message is known by: the id of an order, or those of instant actions.
-fn ids(message: Option<&Value>) -> Vec<String> {
-    let id = |value: &Value, name: &str| value.get(name).and_then(Value::as_str).map(str::to_owned);
-    let Some(message) = message else { return Vec::new() };
-    let actions = message.get("actions").and_then(Value::as_array);
-    let actions = actions
+fn ids(message: &MessageView) -> Vec<String> {
+    let order = message.order().and_then(|order| order.order_id.text());
+    let actions = message.instant_actions().into_iter().flat_map(|all| &all.actions);
+    let all = order
         .into_iter()
-        .flatten()
-        .filter_map(|action| id(action, "actionId"));
-    let all = id(message, "orderId").into_iter().chain(actions);
+        .chain(actions.filter_map(|action| action.action_id.text()));
     // A short one may stand anywhere.
-    all.filter(|id| id.len() >= 6).collect()
+    all.filter(|id| id.len() >= 6).map(str::to_owned).collect()
 }
 
 #[cfg(test)]

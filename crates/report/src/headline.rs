@@ -3,10 +3,11 @@
 //! Only for people; nothing is decided by it. Every value may come from a device and is cleaned and bounded
 //! here.
 
-use serde_json::Value;
-
 use super::clean::{line, short};
-use tck_journal::{Entry, Event, Packet};
+use tck_journal::{Entry, Event, Journal, Packet};
+use tck_view::{
+    ActionState, InstantActionsView, Json, Member, MessageView, Names, Number, OrderView, StateView, Text, Topic,
+};
 
 /// Longest single value in a headline, in characters.
 const VALUE: usize = 36;
@@ -71,27 +72,37 @@ pub fn packet_name(packet: &Packet) -> &str {
     }
 }
 
-/// What a message says, in a few words; `before` is the message before it on the same topic, so that only
-/// what changed among the actions is named.
+/// A record as a message of the topic it was seen on.
 #[must_use]
-pub fn headline(entry: &Entry, before: Option<&Value>) -> String {
+pub fn view<'e>(entry: &'e Entry, names: &Names) -> Option<&'e MessageView> {
+    let topic = topic(entry)?;
+    entry.view(Topic::of_name(&topic), names)
+}
+
+/// What a message says, in a few words; `before` is the state before it, so that only what changed among the actions is
+/// named.
+#[must_use]
+pub fn headline(entry: &Entry, before: Option<&StateView>, names: &Names) -> String {
     let Some(payload) = entry.payload() else {
         return String::new();
     };
-    let Some(message) = entry.json() else {
+    let Some(message) = view(entry, names) else {
         let problem = entry
             .parsed()
             .and_then(|parsed| parsed.problems().first().map(ToString::to_string));
         let problem = problem.unwrap_or_else(|| "not JSON".to_owned());
         return short(&line(&format!("{} bytes: {problem}", payload.len())), 90).into_owned();
     };
-    let parts = match topic(entry).as_deref() {
-        Some("order") => order(message),
-        Some("instantActions") => instant_actions(message),
-        Some("state") => state(message, before),
-        Some("connection") => vec![value(message.get("connectionState"))],
-        Some("visualization") => vec!["position and velocity".to_owned()],
-        Some("factsheet") => vec![value(message.pointer("/typeSpecification/seriesName"))],
+    let parts = match message {
+        MessageView::Order(message) => order(message),
+        MessageView::InstantActions(message) => instant_actions(message),
+        MessageView::State(message) => state(message, before),
+        MessageView::Connection(message) => vec![text(&message.connection_state)],
+        MessageView::Visualization(_) => vec!["position and velocity".to_owned()],
+        MessageView::Factsheet(message) => {
+            let kind = message.type_specification.there();
+            vec![kind.map_or_else(String::new, |kind| text(&kind.series_name))]
+        }
         _ => vec![format!("{} bytes", payload.len())],
     };
     parts
@@ -101,25 +112,37 @@ pub fn headline(entry: &Entry, before: Option<&Value>) -> String {
         .join(" · ")
 }
 
-/// A scalar as it stands there; nothing for `null` and for what is absent.
-fn value(value: Option<&Value>) -> String {
+/// A text as it stands there; nothing for `null` and for what is absent.
+fn text(member: &Member<Text>) -> String {
+    member
+        .text()
+        .map_or_else(|| odd(member.other()), |text| short(&line(text), VALUE).into_owned())
+}
+
+/// A number as it stands there.
+fn number(member: &Member<Number>) -> String {
+    let number = member.number();
+    number.map_or_else(
+        || odd(member.other()),
+        |number| short(&number.to_string(), VALUE).into_owned(),
+    )
+}
+
+/// What stands there instead of what should.
+fn odd(value: Option<&Json>) -> String {
     match value {
-        None | Some(Value::Null) => String::new(),
-        Some(Value::String(text)) => short(&line(text), VALUE).into_owned(),
-        Some(other @ (Value::Bool(_) | Value::Number(_))) => short(&other.to_string(), VALUE).into_owned(),
-        Some(Value::Array(_)) => "[…]".to_owned(),
-        Some(Value::Object(_)) => "{…}".to_owned(),
+        None | Some(Json::Null) => String::new(),
+        Some(Json::Text(text)) => short(&line(text), VALUE).into_owned(),
+        Some(other @ (Json::Flag(_) | Json::Number(_))) => short(&other.to_string(), VALUE).into_owned(),
+        Some(Json::List(_)) => "[…]".to_owned(),
+        Some(Json::Object(_)) => "{…}".to_owned(),
     }
 }
 
-fn list<'a>(message: &'a Value, name: &str) -> &'a [Value] {
-    message.get(name).and_then(Value::as_array).map_or(&[], Vec::as_slice)
-}
-
-fn order_name(message: &Value) -> String {
-    match value(message.get("orderId")).as_str() {
+fn order_name(order_id: &Member<Text>, update: &Member<Number>) -> String {
+    match text(order_id).as_str() {
         "" => "no order".to_owned(),
-        id => match value(message.get("orderUpdateId")).as_str() {
+        id => match number(update).as_str() {
             "" => id.to_owned(),
             update => format!("{id} / {update}"),
         },
@@ -138,58 +161,54 @@ fn named(names: impl ExactSizeIterator<Item = String>) -> String {
     shown.join(", ") + &more
 }
 
-fn order(message: &Value) -> Vec<String> {
-    let nodes = list(message, "nodes");
-    let released = nodes
-        .iter()
-        .filter(|node| node.get("released") == Some(&Value::Bool(true)))
-        .count();
-    let horizon = nodes.len() - released;
+fn order(message: &OrderView) -> Vec<String> {
+    let released = message.nodes.iter().filter(|node| node.released.is(true)).count();
+    let horizon = message.nodes.total() - released;
     let ahead = if horizon > 0 {
         format!(", {horizon} in the horizon")
     } else {
         String::new()
     };
-    vec![order_name(message), format!("{released} nodes released{ahead}")]
+    vec![
+        order_name(&message.order_id, &message.order_update_id),
+        format!("{released} nodes released{ahead}"),
+    ]
 }
 
-fn instant_actions(message: &Value) -> Vec<String> {
-    // The member has had two names.
-    let actions = [list(message, "actions"), list(message, "instantActions")];
-    let actions = actions.into_iter().find(|list| !list.is_empty()).unwrap_or_default();
-    vec![named(actions.iter().map(|action| value(action.get("actionType"))))]
+fn instant_actions(message: &InstantActionsView) -> Vec<String> {
+    let lists = [&message.actions, &message.misnamed_actions];
+    let actions = lists.into_iter().find(|list| !list.is_empty());
+    let actions = actions.map_or(&[][..], Member::elements);
+    vec![named(actions.iter().map(|action| text(&action.action_type)))]
 }
 
-fn state(message: &Value, before: Option<&Value>) -> Vec<String> {
-    let flag = |name: &str, word: &str| {
-        if message.get(name) == Some(&Value::Bool(true)) {
+fn state(message: &StateView, before: Option<&StateView>) -> Vec<String> {
+    let flag = |member: &Member<bool>, word: &str| {
+        if member.is(true) {
             word.to_owned()
         } else {
             String::new()
         }
     };
-    let node = match value(message.get("lastNodeId")).as_str() {
+    let node = match text(&message.last_node_id).as_str() {
         "" => String::new(),
-        node => format!("at {node} ({})", value(message.get("lastNodeSequenceId"))),
+        node => format!("at {node} ({})", number(&message.last_node_sequence_id)),
     };
-    let mode = match value(message.get("operatingMode")).as_str() {
+    let mode = match text(&message.operating_mode).as_str() {
         "AUTOMATIC" => String::new(),
         other => other.to_owned(),
     };
-    let errors = list(message, "errors");
-    let errors = match errors.len() {
+    let kinds = message.errors.iter().map(|error| text(&error.error_type));
+    let errors = match message.errors.total() {
         0 => String::new(),
-        1 => format!("1 error: {}", value(errors[0].get("errorType"))),
-        many => format!(
-            "{many} errors: {}",
-            named(errors.iter().map(|error| value(error.get("errorType"))))
-        ),
+        1 => format!("1 error: {}", named(kinds)),
+        many => format!("{many} errors: {}", named(kinds)),
     };
     vec![
-        order_name(message),
+        order_name(&message.order_id, &message.order_update_id),
         node,
-        flag("driving", "driving"),
-        flag("paused", "paused"),
+        flag(&message.driving, "driving"),
+        flag(&message.paused, "paused"),
         mode,
         errors,
         actions(message, before),
@@ -197,23 +216,23 @@ fn state(message: &Value, before: Option<&Value>) -> Vec<String> {
 }
 
 /// Actions whose status is not what it was in the state before.
-fn actions(message: &Value, before: Option<&Value>) -> String {
-    let status_before = |id: Option<&Value>| {
-        let states = before.map(|before| list(before, "actionStates")).unwrap_or_default();
-        states
-            .iter()
-            .find(|action| action.get("actionId") == id)
-            .and_then(|action| action.get("actionStatus"))
+fn actions(message: &StateView, before: Option<&StateView>) -> String {
+    let is_new = |action: &&ActionState| {
+        let mut known = before.into_iter().flat_map(StateView::all_action_states);
+        let known = known.find(|known| known.action_id == action.action_id);
+        known.map_or(!action.action_status.is_absent(), |known| {
+            known.action_status != action.action_status
+        })
     };
-    let changed: Vec<String> = list(message, "actionStates")
-        .iter()
-        .filter(|action| status_before(action.get("actionId")) != action.get("actionStatus"))
+    let changed: Vec<String> = message
+        .all_action_states()
+        .filter(is_new)
         .map(|action| {
-            let name = match value(action.get("actionType")).as_str() {
-                "" => value(action.get("actionId")),
+            let name = match text(&action.action_type).as_str() {
+                "" => text(&action.action_id),
                 name => name.to_owned(),
             };
-            format!("{name} {}", value(action.get("actionStatus")))
+            format!("{name} {}", text(&action.action_status))
         })
         .collect();
     named(changed.into_iter())
@@ -221,9 +240,11 @@ fn actions(message: &Value, before: Option<&Value>) -> String {
 
 /// `#121 state (order-7 / 1 · at n3 (4))`, or only the number when the journal does not have it.
 #[must_use]
-pub fn reference(entry: Option<&Entry>, seq: u64) -> String {
-    let Some(entry) = entry else { return format!("#{seq}") };
-    match headline(entry, None) {
+pub fn reference(journal: Option<&Journal>, seq: u64) -> String {
+    let Some((journal, entry)) = journal.and_then(|journal| Some((journal, journal.get(seq)?))) else {
+        return format!("#{seq}");
+    };
+    match headline(entry, None, journal.names()) {
         text if text.is_empty() => format!("#{seq} {}", kind(entry)),
         text => format!("#{seq} {} ({text})", kind(entry)),
     }

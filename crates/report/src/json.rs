@@ -12,6 +12,8 @@ use tck_result::RunResult;
 
 /// The format this version writes and reads.
 pub const FORMAT: &str = "vda5050-tck.result/1";
+/// The member of a result that says its format.
+const FORMAT_MEMBER: &str = "format";
 
 /// Why a result could not be written or read.
 #[derive(Debug, thiserror::Error)]
@@ -78,7 +80,7 @@ pub fn to_string(result: &RunResult) -> Result<String, ResultError> {
 pub fn from_str(text: &str, name: &str) -> Result<RunResult, ResultError> {
     let name = || name.to_owned();
     let value: Value = serde_json::from_str(text).map_err(|source| ResultError::NotJson { name: name(), source })?;
-    let found = value.get("format").and_then(Value::as_str).unwrap_or_default();
+    let found = value.get(FORMAT_MEMBER).and_then(Value::as_str).unwrap_or_default();
     if !found.starts_with("vda5050-tck.result/") {
         return Err(ResultError::NotAResult { name: name() });
     }

@@ -85,8 +85,7 @@ fn row(finding: &Finding<'_>, journal: Option<&Journal>, color: Color, text: &mu
         .map_or(String::new(), |origin| format!("   {}", line(origin)));
     let times = many(usize::try_from(finding.count).unwrap_or(usize::MAX), "time");
     let first = finding.first.map_or(String::new(), |seq| {
-        let entry = journal.and_then(|journal| journal.get(seq)).map(AsRef::as_ref);
-        format!(", first at {}", short(&line(&reference(entry, seq)), 120))
+        format!(", first at {}", short(&line(&reference(journal, seq)), 120))
     });
     let origin = color.dim().apply_to(origin);
     let _ = writeln!(

@@ -155,13 +155,13 @@ pub fn decision(decision: &Decision, sources: &Sources, journal: Option<&Journal
         let came = many(usize::try_from(messages).unwrap_or(usize::MAX), "message");
         note(
             "waited",
-            format!("{} after {}; {came} came", seconds(time), reference(find(since), since)),
+            format!("{} after {}; {came} came", seconds(time), reference(journal, since)),
         );
     }
     // Where the message that decided is the nearest miss, the line below says more about it.
     let is_nearest = |seq| decision.nearest.as_ref().is_some_and(|nearest| nearest.seq == seq);
     if let Some(witness) = decision.witness.filter(|witness| !is_nearest(*witness)) {
-        note("decided", format!("by {}", reference(find(witness), witness)));
+        note("decided", format!("by {}", reference(journal, witness)));
     }
     if decision.nearest.is_none() && decision.explanation.is_some() {
         note("found", short(&line(&decision.message), 400).into_owned());

@@ -1,6 +1,5 @@
 //! Before the first test: the device is there, and has said what it can do.
 
-use std::borrow::Cow;
 use std::time::Duration;
 
 use serde_json::{Value, json};
@@ -8,11 +7,13 @@ use serde_json::{Value, json};
 use super::identity::somebody_else;
 use super::presence::{Presence, is_stale};
 use super::session::Session;
+use super::sheet::Sheet;
 use tck_engine::{EngineError, Operator, Recorder};
 use tck_journal::event::Event;
 use tck_net::link::Link;
 use tck_pack::Role;
 use tck_profile::show_duration;
+use tck_view::{Field, Header, MapState, Position, StateView};
 
 /// How often a person is told what is waited for.
 const TOLD_EVERY: Duration = Duration::from_secs(10);
@@ -68,7 +69,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             return Ok(Err(why));
         }
         self.active_map()?;
-        self.home.first = self.engine.recorder.judge().state().map(Cow::into_owned);
+        self.home.first = self.engine.recorder.judge().state();
         self.home.before.clone_from(&self.home.first);
         self.read_over(self.engine.link.now().moment).await?;
         Ok(Ok(()))
@@ -81,9 +82,10 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
 
     /// What the device says otherwise of itself than in the run that this one goes on with.
     pub(super) fn is_another(&self) -> Option<String> {
-        let before = self.engine.recorder.judge().factsheet_before()?;
-        let now = self.setup.capabilities.factsheet.as_ref()?;
-        let (place, before, now) = difference(before, now)?;
+        let judge = self.engine.recorder.judge();
+        self.setup.capabilities.factsheet.as_ref()?;
+        let now = judge.ground().factsheet_json()?;
+        let (place, before, now) = difference(judge.factsheet_before()?, now)?;
         Some(format!(
             "the run cannot be resumed: `{place}` of the factsheet was {before}, and is {now} now"
         ))
@@ -185,7 +187,8 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
                 name: "device.factsheet".to_owned(),
                 value: sheet.clone(),
             })?;
-            self.setup.capabilities.factsheet = Some(sheet);
+            let names = self.engine.recorder.judge().timeline().names();
+            self.setup.capabilities.factsheet = Some(Sheet::read(&sheet, names));
             let contradictions = self.setup.capabilities.contradictions();
             self.setup.limits.extend(contradictions);
         }
@@ -194,23 +197,19 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
 
     /// The map the vehicle stands on, if it says so: `device.activeMap`.
     fn active_map(&mut self) -> Result<(), EngineError> {
-        let state = self
-            .engine
-            .recorder
-            .judge()
-            .timeline()
-            .of("state")
-            .last()
-            .and_then(|entry| entry.json().cloned());
-        let found = state.as_ref().and_then(|state| {
-            let id = state.pointer("/agvPosition/mapId")?;
-            let enabled = self.engine.recorder.judge().ground().pack.word("mapStatus.enabled")?;
-            let maps = state.get("maps")?.as_array()?;
-            let active = maps.iter().find(|map| {
-                map.get("mapId") == Some(id)
-                    && map.get("mapStatus").and_then(serde_json::Value::as_str) == Some(enabled)
+        let judge = self.engine.recorder.judge();
+        let (timeline, names) = (judge.timeline(), judge.timeline().names());
+        let state = timeline.of("state").last().and_then(|entry| entry.json());
+        let found = state.and_then(|state| {
+            let id = names.raw(state, &[StateView::position, Position::map_id])?;
+            let enabled = judge.ground().pack.word("mapStatus.enabled")?;
+            let mut maps = names.raw_elements(state, StateView::maps).iter();
+            let active = maps.find(|map| {
+                let status = names.raw(map, &[MapState::map_status]).and_then(Value::as_str);
+                names.raw(map, &[MapState::map_id]) == Some(id) && status == Some(enabled)
             })?;
-            Some(json!({ "mapId": id, "mapVersion": active.get("mapVersion")? }))
+            let version = names.raw(active, &[MapState::map_version])?;
+            Some(json!({ "mapId": id, "mapVersion": version }))
         });
         if let Some(value) = found {
             let statements = &mut self.setup.capabilities.statements;
@@ -256,7 +255,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
 }
 
 /// Members of the header: they differ from message to message.
-const HEADER: [&str; 2] = ["headerId", "timestamp"];
+const HEADER: [Field; 2] = [Header::header_id, Header::timestamp];
 
 /// Where two factsheets differ first, and what stands there in each.
 fn difference(before: &Value, now: &Value) -> Option<(String, String, String)> {
@@ -267,7 +266,8 @@ fn difference(before: &Value, now: &Value) -> Option<(String, String, String)> {
         let inside = match (before, now) {
             (Some(Value::Object(before)), Some(Value::Object(now))) => {
                 let names = before.keys().chain(now.keys());
-                let mut names = names.filter(|name| !path.is_empty() || !HEADER.contains(&name.as_str()));
+                let mut names =
+                    names.filter(|name| !path.is_empty() || !HEADER.iter().any(|field| field.usual_name() == *name));
                 return names.find_map(|name| {
                     let path = if path.is_empty() {
                         name.clone()

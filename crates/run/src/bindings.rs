@@ -19,26 +19,17 @@ const WILL_MARGIN: u64 = 3_000;
 
 /// Where the vehicle stands, as its last state says.
 pub(super) fn standing(judge: &RunJudge, layout: &Layout, home: &Home) -> Option<Standing> {
-    let state = judge
-        .timeline()
-        .of("state")
-        .iter()
-        .rev()
-        .find_map(|entry| entry.json())?;
-    let node = state
-        .get("lastNodeId")
-        .and_then(Value::as_str)
-        .filter(|id| !id.is_empty());
+    let (_, state) = judge.timeline().states_back().next()?;
+    let node = state.last_node_id.text().filter(|id| !id.is_empty());
     // An order has to begin where the vehicle stands, which may be off its last node.
     if let Some(node) = node.filter(|id| layout.node(id).is_some() && !home.is_between_nodes(state, layout)) {
         return Some(Standing::Node(node.to_owned()));
     }
-    let position = state.get("agvPosition")?;
-    let number = |name: &str| position.get(name).and_then(Value::as_f64);
+    let position = state.position.there()?;
     Some(Standing::Pose {
-        map: position.get("mapId")?.as_str()?.to_owned(),
-        x: number("x")?,
-        y: number("y")?,
+        map: position.map_id.text()?.to_owned(),
+        x: position.x.float()?,
+        y: position.y.float()?,
     })
 }
 
@@ -70,12 +61,7 @@ pub(super) fn course_of(
     };
     let course = course.map_err(|error| Reason::observed(error.to_string()))?;
     let mut course = course.bindings();
-    let factsheet = judge
-        .ground()
-        .bindings
-        .get("device")
-        .and_then(|device| device.get("factsheet"));
-    Pace::of(factsheet).set(&mut course);
+    Pace::of(judge.ground().factsheet().as_deref()).set(&mut course);
     Ok(Some(flat(course)))
 }
 
@@ -96,8 +82,8 @@ pub(super) fn own_bindings(
             .map(|millis| ("look".to_owned(), millis.into())),
     );
     own.extend(course.map(|course| ("course".to_owned(), course)));
-    let device = judge.ground().bindings.get("device");
-    let form = IdForm::of(device.and_then(|device| device.pointer("/factsheet/protocolLimits/maxStringLens")));
+    let factsheet = judge.ground().factsheet();
+    let form = IdForm::of(factsheet.as_ref().and_then(|sheet| sheet.string_limits()));
     let ids = fresh_names(test).into_iter().enumerate().map(|(place, name)| {
         let id = form.of_name(run, number, &name, place);
         (name, Value::from(id))

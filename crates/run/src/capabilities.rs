@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use serde_json::{Map, Value};
 
 use super::fits::outgrown;
+use super::sheet::Sheet;
 use tck_base::pattern::{Term, TermKind};
 use tck_journal::event::{Capability, Gate};
 use tck_journal::{Reason, Vantage};
@@ -22,7 +23,7 @@ const ACTIVE_MAP: &str = "active-map";
 #[derive(Clone, Debug)]
 pub struct Capabilities {
     /// The factsheet, once it was received.
-    pub factsheet: Option<Value>,
+    pub factsheet: Option<Sheet>,
     /// What the profile states: `stops-between-nodes` and so on.
     pub statements: BTreeMap<String, bool>,
     /// What the suites know of the device below `device`: its sample actions among it.
@@ -146,7 +147,7 @@ impl Capabilities {
             Need::Optional(path) => self.optional(path),
             Need::NoOptional(path) => reverse(self.optional(path), path),
             Need::NotRequired(path) => self.not_required(path),
-            Need::Limit(path) => self.declared(&[format!("limit {path}")], |sheet| has_limit(sheet, path)),
+            Need::Limit(path) => self.declared(&[format!("limit {path}")], |sheet| sheet.has_limit(path)),
         }
     }
 
@@ -162,10 +163,11 @@ impl Capabilities {
             _ => literal(&action.action)?,
         };
         let sheet = self.factsheet.as_ref()?;
-        let mut listed = sheet.pointer("/protocolFeatures/agvActions")?.as_array()?.iter();
-        let own = listed.find(|listed| listed.get("actionType").and_then(Value::as_str) == Some(action_type))?;
-        let types = own.get("blockingTypes")?.as_array()?;
-        let allowed = types.is_empty() || types.iter().any(|known| known.as_str() == Some(wanted));
+        let own = sheet
+            .offered_actions()
+            .find(|listed| listed.action_type.is(action_type))?;
+        let types = own.blocking_types.there()?;
+        let allowed = types.is_empty() || types.iter().any(|known| known.is(wanted));
         (!allowed).then(|| Reason::BlockingTypeNotListed {
             action: action_type.to_owned(),
             blocking: wanted.to_owned(),
@@ -178,7 +180,7 @@ impl Capabilities {
             Some(_) => vec![action_name(name, scope), whole],
             None => vec![whole],
         };
-        self.declared(&names, |sheet| has_action(sheet, name, scope))
+        self.declared(&names, |sheet| sheet.has_action(name, scope))
     }
 
     fn not_required(&self, path: &str) -> Gate {
@@ -187,7 +189,7 @@ impl Capabilities {
                 parameter: path.to_owned(),
             });
         };
-        if requires(sheet, path) {
+        if sheet.requires(path) {
             return Gate::NotApplicable(Reason::Required {
                 parameter: path.to_owned(),
             });
@@ -196,11 +198,11 @@ impl Capabilities {
     }
 
     fn optional(&self, path: &str) -> Gate {
-        self.declared(&[format!("optional {path}")], |sheet| has_optional(sheet, path))
+        self.declared(&[format!("optional {path}")], |sheet| sheet.has_optional(path))
     }
 
     /// Whether it has something, by its names, the most exact one first.
-    fn declared(&self, names: &[String], says: impl Fn(&Value) -> Option<bool>) -> Gate {
+    fn declared(&self, names: &[String], says: impl Fn(&Sheet) -> Option<bool>) -> Gate {
         let capability = names.first().cloned().unwrap_or_default();
         let claimed = names.iter().find_map(|name| self.claims.get(name)).copied();
         let listed = self.factsheet.as_ref().map(says);
@@ -226,10 +228,10 @@ impl Capabilities {
         let one = |(name, claimed): (&String, &bool)| {
             let words: Vec<&str> = name.split(' ').collect();
             let listed = match words[..] {
-                ["action", action] => has_action(sheet, action, None),
-                ["action", action, scope] => has_action(sheet, action, Some(scope)),
-                ["optional", path] => has_optional(sheet, path),
-                ["limit", path] => has_limit(sheet, path),
+                ["action", action] => sheet.has_action(action, None),
+                ["action", action, scope] => sheet.has_action(action, Some(scope)),
+                ["optional", path] => sheet.has_optional(path),
+                ["limit", path] => sheet.has_limit(path),
                 _ => None,
             }?;
             let (sheet_says, profile_says) = if *claimed {
@@ -247,32 +249,19 @@ impl Capabilities {
     #[must_use]
     pub fn list(&self) -> Vec<Capability> {
         let mut all = BTreeMap::new();
-        let entries = self
-            .factsheet
-            .iter()
-            .filter_map(|sheet| sheet.pointer("/protocolFeatures/agvActions")?.as_array());
-        for action in entries.flatten() {
-            let name = action.get("actionType").and_then(Value::as_str).unwrap_or("?");
-            for scope in action
-                .get("actionScopes")
-                .and_then(Value::as_array)
-                .into_iter()
-                .flatten()
-            {
-                let scope = scope.as_str().unwrap_or("?");
+        for action in self.factsheet.iter().flat_map(|sheet| sheet.offered_actions()) {
+            let name = action.action_type.text().unwrap_or("?");
+            for scope in &action.action_scopes {
+                let scope = scope.text().unwrap_or("?");
                 all.insert(
                     action_name(name, Some(scope)),
                     ("yes".to_owned(), "factsheet".to_owned()),
                 );
             }
         }
-        let optional = self
-            .factsheet
-            .iter()
-            .filter_map(|sheet| sheet.pointer("/protocolFeatures/optionalParameters")?.as_array());
-        for parameter in optional.flatten() {
-            let name = parameter.get("parameter").and_then(Value::as_str).unwrap_or("?");
-            let support = parameter.get("support").and_then(Value::as_str).unwrap_or("?");
+        for parameter in self.factsheet.iter().flat_map(|sheet| sheet.optional_parameters()) {
+            let name = parameter.parameter.text().unwrap_or("?");
+            let support = parameter.support.text().unwrap_or("?");
             all.insert(format!("optional {name}"), (support.to_owned(), "factsheet".to_owned()));
         }
         for (name, claimed) in self.statements.iter().chain(&self.claims) {
@@ -328,54 +317,16 @@ fn reverse(gate: Gate, name: &str) -> Gate {
     }
 }
 
-/// Whether the factsheet lists an action; `None` when it has no such list.
-fn has_action(sheet: &Value, name: &str, scope: Option<&str>) -> Option<bool> {
-    let all = sheet.pointer("/protocolFeatures/agvActions")?.as_array()?;
-    Some(all.iter().any(|action| {
-        let scopes = action.get("actionScopes").and_then(Value::as_array);
-        action.get("actionType").and_then(Value::as_str) == Some(name)
-            && scope.is_none_or(|scope| scopes.into_iter().flatten().any(|other| other.as_str() == Some(scope)))
-    }))
-}
-
-/// Whether the factsheet lists an optional parameter; `None` when it has no such list.
-fn has_optional(sheet: &Value, path: &str) -> Option<bool> {
-    let all = sheet.pointer("/protocolFeatures/optionalParameters")?.as_array()?;
-    let named = |one: &Value| one.get("parameter").and_then(Value::as_str) == Some(path);
-    Some(all.iter().any(named))
-}
-
-/// Whether the vehicle cannot do without the optional parameter, or without a part of it.
-fn requires(sheet: &Value, path: &str) -> bool {
-    let all = sheet.pointer("/protocolFeatures/optionalParameters");
-    let mut all = all.and_then(Value::as_array).into_iter().flatten();
-    all.any(|one| {
-        let name = one.get("parameter").and_then(Value::as_str).unwrap_or_default();
-        let part = name
-            .strip_prefix(path)
-            .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
-        part && one.get("support").and_then(Value::as_str) == Some("REQUIRED")
-    })
-}
-
-/// `maxArrayLens.order.nodes`: a group of `protocolLimits` and a member whose name has dots in it; `None` when there are
-/// no limits at all.
-fn has_limit(sheet: &Value, path: &str) -> Option<bool> {
-    let limits = sheet.get("protocolLimits")?;
-    let (group, member) = path.split_once('.').unwrap_or((path, ""));
-    let value = limits.get(group).and_then(|group| group.get(member));
-    Some(value.and_then(Value::as_f64).is_some_and(|limit| limit > 0.0))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use serde_json::json;
     use tck_base::diagnostic::{Source, Span};
+    use tck_view::Names;
 
     fn capabilities(factsheet: Option<Value>) -> Capabilities {
         Capabilities {
-            factsheet,
+            factsheet: factsheet.map(|sheet| Sheet::read(&sheet, &Names::default())),
             statements: BTreeMap::from([("node-bound".to_owned(), false)]),
             samples: Map::new(),
             claims: BTreeMap::new(),

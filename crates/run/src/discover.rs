@@ -9,10 +9,12 @@ use std::time::Duration;
 use serde::Serialize;
 use serde_json::Value;
 
+use super::sheet::Sheet;
 use tck_journal::json::Parsed;
 use tck_net::bench::client::{Client, ClientEvent, ClientOptions};
 use tck_net::bench::endpoint::Endpoint;
-use tck_pack::Packs;
+use tck_pack::{Pack, Packs};
+use tck_view::{Header, Member, MessageView, Topic};
 
 /// How many devices are told apart; a broker with more is shown in parts.
 const DEVICES: usize = 2_000;
@@ -115,19 +117,35 @@ impl Heard {
 }
 
 impl Device {
+    /// The pack of its version; the latest one where it names none that is known.
+    fn pack<'p>(&self, packs: &'p Packs) -> &'p Pack {
+        let own = self.version.as_deref().and_then(|version| packs.get(version));
+        own.unwrap_or_else(|| packs.latest())
+    }
+
+    /// Its factsheet, if one was heard.
+    #[must_use]
+    pub fn sheet(&self, packs: &Packs) -> Option<Sheet> {
+        let message = self.factsheet.as_ref()?;
+        Some(Sheet::read(message, self.pack(packs).names()))
+    }
+
     fn read(&mut self, name: &str, message: &Value, packs: &Packs) {
-        let text = |pointer: &str| message.pointer(pointer).and_then(Value::as_str).map(str::to_owned);
-        for (member, by_topic) in [
-            ("manufacturer", self.manufacturer.clone()),
-            ("serialNumber", self.serial_number.clone()),
+        let topic = Topic::of_name(name);
+        let view = MessageView::of_value(topic, message, self.pack(packs).names());
+        let header = view.header();
+        for (member, own, by_topic) in [
+            (Header::manufacturer, &header.manufacturer, self.manufacturer.clone()),
+            (Header::serial_number, &header.serial_number, self.serial_number.clone()),
         ] {
-            match message.get(member).and_then(Value::as_str) {
+            let member = member.usual_name();
+            match own.text() {
                 Some(own) if own == by_topic => {}
                 Some(own) => self.remark(format!("{name}: {member} is {own:?}, and {by_topic:?} in the topic")),
                 None => self.remark(format!("{name}: the header has no {member}")),
             }
         }
-        if let Some(version) = text("/version") {
+        if let Some(version) = header.version.text().map(str::to_owned) {
             if packs.get(&version).is_none() {
                 self.remark(format!("{name}: version {version} is not known here"));
             }
@@ -136,12 +154,12 @@ impl Device {
                     "{name}: version is {version}, and another one in other messages"
                 ));
             }
-            if is_of_vehicle(name) {
+            if topic.is_from_vehicle() {
                 self.version = Some(version);
             }
         }
-        let pack = self.version.as_deref().and_then(|version| packs.get(version));
-        let schema = pack.unwrap_or_else(|| packs.latest()).schema(name);
+        let pack = self.pack(packs);
+        let schema = pack.schema(name);
         if let Some(finding) = schema.and_then(|schema| schema.findings(message).into_iter().next()) {
             let place = if finding.path.is_empty() {
                 "the message"
@@ -150,26 +168,36 @@ impl Device {
             };
             self.remark(format!("{name}: {place}: {}", finding.message));
         }
-        match name {
-            "connection" => self.connection = text("/connectionState").or(self.connection.take()),
-            "factsheet" => self.factsheet = Some(message.clone()),
+        // Only now is it known what its version calls things.
+        match MessageView::of_value(topic, message, pack.names()) {
+            MessageView::Connection(said) => {
+                self.connection = said
+                    .connection_state
+                    .text()
+                    .map(str::to_owned)
+                    .or(self.connection.take());
+            }
+            MessageView::Factsheet(_) => self.factsheet = Some(message.clone()),
+            MessageView::State(state) => {
+                self.mode = state.operating_mode.text().map(str::to_owned).or(self.mode.take());
+                let node = state.last_node_id.text().filter(|id| !id.is_empty());
+                self.last_node = node.map(str::to_owned).or(self.last_node.take());
+                self.stands(&state.position);
+            }
+            MessageView::Visualization(shown) => self.stands(&shown.position),
             _ => {}
         }
-        if is_of_vehicle(name) {
-            self.mode = text("/operatingMode").or(self.mode.take());
-            self.last_node = text("/lastNodeId")
-                .filter(|id| !id.is_empty())
-                .or(self.last_node.take());
-            let number = |name: &str| message.pointer("/agvPosition")?.get(name)?.as_f64();
-            let position = || {
-                Some(Position {
-                    x: number("x")?,
-                    y: number("y")?,
-                    map_id: text("/agvPosition/mapId")?,
-                })
-            };
-            self.position = position().or(self.position.take());
-        }
+    }
+
+    fn stands(&mut self, shown: &Member<tck_view::Position>) {
+        let position = shown.there().and_then(|position| {
+            Some(Position {
+                x: position.x.float()?,
+                y: position.y.float()?,
+                map_id: position.map_id.text()?.to_owned(),
+            })
+        });
+        self.position = position.or(self.position.take());
     }
 
     /// Keeps the first remarks, each once.
@@ -179,10 +207,6 @@ impl Device {
             self.remarks.push(text);
         }
     }
-}
-
-fn is_of_vehicle(name: &str) -> bool {
-    matches!(name, "state" | "visualization" | "connection" | "factsheet")
 }
 
 /// Prefix, manufacturer, serial number and name of a topic; `None` when it is of no device.

@@ -3,7 +3,9 @@
 //! The mock AGVs are the harness's own, so they can be put back by hand. What the master control still wants of them
 //! is called off first, by its hook `cancel` if there is one.
 
-use serde_json::{Map, Value};
+use std::sync::Arc;
+
+use serde_json::Map;
 
 use super::session::Session;
 use tck_course::Node;
@@ -13,6 +15,8 @@ use tck_journal::event::Event;
 use tck_net::link::Link;
 use tck_simulate::Fleet;
 use tck_suite::model::Test;
+use tck_view::StateView;
+use tck_world::rest::{has_order, place};
 
 /// A vehicle that is no farther from its node, in metres, stands on it.
 const ON_NODE: f64 = 0.05;
@@ -109,33 +113,31 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         let mut own = entries.take_while(|entry| !matches!(entry.event(), Event::TestBegun { .. }));
         let touched =
             own.any(|entry| matches!(entry.event(), Event::Vehicle { vehicle: other, .. } if *other == vehicle));
-        let number = |state: &Value, path: &str| state.pointer(path).and_then(Value::as_f64);
         let on_its_node = || {
             let state = self.last_state(vehicle)?;
             let node = self.last_node(vehicle)?;
-            let (x, y) = (number(state, "/agvPosition/x")?, number(state, "/agvPosition/y")?);
-            let none = |name: &str| state.get(name).and_then(Value::as_array).is_none_or(Vec::is_empty);
-            let idle = none("nodeStates") && none("edgeStates") && none("errors");
-            Some(idle && node.distance(x, y) < ON_NODE)
+            let (x, y) = place(state)?;
+            Some(!has_order(state) && state.errors.is_empty() && node.distance(x, y) < ON_NODE)
         };
         !touched && on_its_node().unwrap_or(false)
     }
 
     /// The parameter that names the first vehicle to a hook.
-    fn first_vehicle(&self) -> Map<String, Value> {
+    fn first_vehicle(&self) -> Map<String, serde_json::Value> {
         let ground = self.engine.recorder.judge().ground();
         Map::from_iter([("vehicle".to_owned(), ground.identity.1.clone().into())])
     }
 
     /// What a mock AGV has said last.
-    fn last_state(&self, vehicle: usize) -> Option<&Value> {
+    fn last_state(&self, vehicle: usize) -> Option<&Arc<StateView>> {
         let subject = if vehicle == 0 { "state" } else { "state@second" };
-        self.engine.recorder.judge().timeline().of(subject).last()?.json()
+        let timeline = self.engine.recorder.judge().timeline();
+        timeline.state(timeline.of(subject).last()?)
     }
 
     /// The node a mock AGV was on last, if the layout knows it.
     fn last_node(&self, vehicle: usize) -> Option<&Node> {
-        let node = self.last_state(vehicle)?.get("lastNodeId")?.as_str()?;
+        let node = self.last_state(vehicle)?.last_node_id.text()?;
         self.setup.layout.as_ref()?.node(node)
     }
 }

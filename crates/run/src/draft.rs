@@ -3,9 +3,8 @@
 
 use std::fmt::Write as _;
 
-use serde_json::Value;
-
 use super::discover::Device;
+use super::sheet::Sheet;
 use tck_pack::{Packs, Role};
 use tck_profile::{HOOKS, SAMPLE_ACTIONS};
 
@@ -45,7 +44,7 @@ pub fn draft(device: &Device, wishes: &Wishes, packs: &Packs) -> String {
     );
     text.push_str("# max-speed = 0.5\n");
     layout(device, wishes, &mut text);
-    hooks(device, &mut text);
+    hooks(device.sheet(packs).as_ref(), &mut text);
     text
 }
 
@@ -75,11 +74,13 @@ fn identity(device: &Device, packs: &Packs, text: &mut String) {
     }
     text.push_str("# Harmless actions that tests may use; without them the tests in question are inconclusive.\n");
     text.push_str("# long-action = { type = \"…\" }\n# brief-action = { type = \"…\" }\n");
+    let sheet = device.sheet(packs);
+    let has = |action: &&str| sheet.as_ref().is_some_and(|sheet| has_action(sheet, action));
     for sample in SAMPLE_ACTIONS
         .iter()
         .filter(|sample| !sample.name.starts_with("failing-"))
     {
-        let Some(action) = predefined(sample.name).filter(|action| has_action(device, action)) else {
+        let Some(action) = predefined(sample.name).filter(has) else {
             continue;
         };
         let place = if sample.name.starts_with("edge-") {
@@ -156,7 +157,7 @@ fn layout(device: &Device, wishes: &Wishes, text: &mut String) {
 }
 
 /// The hooks that make sense for what the device can do.
-fn hooks(device: &Device, text: &mut String) {
+fn hooks(sheet: Option<&Sheet>, text: &mut String) {
     text.push_str("\n# What people or machines do to the device when a test asks for it. Exactly one of `run`, `http` and `prompt`.\n");
     for hook in HOOKS.iter().filter(|hook| hook.role == Role::Agv) {
         let needs = match hook.name {
@@ -165,7 +166,7 @@ fn hooks(device: &Device, text: &mut String) {
             "block-charging" | "unblock-charging" => "startCharging",
             _ => "",
         };
-        if !needs.is_empty() && device.factsheet.is_some() && !has_action(device, needs) {
+        if !needs.is_empty() && sheet.is_some_and(|sheet| !has_action(sheet, needs)) {
             continue;
         }
         let _ = writeln!(text, "\n# {}", one_line(hook.doc));
@@ -173,13 +174,8 @@ fn hooks(device: &Device, text: &mut String) {
     }
 }
 
-fn has_action(device: &Device, name: &str) -> bool {
-    let actions = device
-        .factsheet
-        .as_ref()
-        .and_then(|sheet| sheet.pointer("/protocolFeatures/agvActions"));
-    let mut actions = actions.and_then(Value::as_array).into_iter().flatten();
-    actions.any(|action| action.get("actionType").and_then(Value::as_str) == Some(name))
+fn has_action(sheet: &Sheet, name: &str) -> bool {
+    sheet.has_action(name, None) == Some(true)
 }
 
 /// The predefined action that a sample action is about.

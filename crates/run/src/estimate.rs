@@ -12,6 +12,7 @@ use tck_base::pattern::TermKind;
 use tck_course::Layout;
 use tck_journal::event::LinkFault;
 use tck_suite::model::{Extent, Step, Test, TimeTerm, Verb};
+use tck_view::FactsheetView;
 
 /// From a message to its answer, by a device that is not slow.
 const EXCHANGE: Duration = Duration::from_millis(50);
@@ -36,7 +37,7 @@ impl<'a> Estimate<'a> {
     /// From the time limits, the factsheet and the floor.
     pub(super) fn of(
         time: Option<&'a Value>,
-        factsheet: Option<&Value>,
+        factsheet: Option<&FactsheetView>,
         layout: Option<&Layout>,
         hook: Duration,
     ) -> Self {
@@ -162,6 +163,7 @@ mod tests {
         let time = json!({ "quiet": 200 });
         let of = |speed: f64, moving: bool| {
             let sheet = json!({ "physicalParameters": { "speedMax": speed } });
+            let sheet = crate::Sheet::read(&sheet, library.rules.packs.latest().names());
             let estimate = Estimate::of(Some(&time), Some(&sheet), Some(&layout), Duration::from_secs(1));
             estimate.of_tests(tests.iter().map(|test| &**test).filter(|test| test.moves == moving))
         };

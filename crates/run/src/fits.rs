@@ -4,46 +4,44 @@
 
 use serde_json::Value;
 
-use tck_base::pattern::{Piece, Term, TermKind, whole};
+use tck_base::pattern::{Piece, Term, TermKind};
 use tck_journal::Reason;
 use tck_suite::model::{Need, Patch, RoutePlace, Send, Test, Verb};
+use tck_view::{ArrayLimits, FactsheetView, Field, Member, Number, StringLimits};
 
 /// The most characters that a variable in an id may stand for.
 const VARIABLE: usize = 64;
 
 /// Why a test is nothing for a vehicle with such a factsheet. A test that is about a limit goes beyond it on purpose.
-pub(super) fn outgrown(sheet: &Value, test: &Test) -> Option<Reason> {
+pub(super) fn outgrown(sheet: &FactsheetView, test: &Test) -> Option<Reason> {
     if test.needs.iter().any(|need| matches!(need, Need::Limit(_))) {
         return None;
     }
-    let limits = sheet.get("protocolLimits")?;
     let sends = test.sections().into_iter().flat_map(|(_, steps)| steps);
     let sends = sends.filter_map(|step| match &step.verb {
         Verb::Send(send) => Some(send.as_ref()),
         _ => None,
     });
     sends.into_iter().find_map(|send| {
-        let arrays = limits.get("maxArrayLens");
-        let too_many = sizes(send)
-            .into_iter()
-            .find_map(|(name, size)| Some((name, size, limit(arrays, name).filter(|limit| *limit < size)?)));
-        too_many
-            .map(|(name, needed, limit)| Reason::ArrayLimit {
-                array: name.to_owned(),
-                limit,
-                needed,
+        let too_many = sheet.array_limits().and_then(|limits| {
+            let mut all = sizes(send).into_iter();
+            all.find_map(|((name, of), needed)| {
+                let limit = limit(of(limits)).filter(|limit| *limit < needed)?;
+                let array = name.usual_name().to_owned();
+                Some(Reason::ArrayLimit { array, limit, needed })
             })
-            .or_else(|| too_long(limits.get("maxStringLens"), send))
+        });
+        too_many.or_else(|| too_long(sheet.string_limits()?, send))
     })
 }
 
 /// A limit of a factsheet; zero stands for none.
-fn limit(limits: Option<&Value>, name: &str) -> Option<u64> {
-    limits?.get(name).and_then(whole).filter(|limit| *limit > 0)
+fn limit(member: &Member<Number>) -> Option<u64> {
+    member.whole().filter(|limit| *limit > 0)
 }
 
 /// What is wrong with an id that a patch spells out, for a vehicle with such limits. All other ids take the form it wants.
-fn too_long(lengths: Option<&Value>, send: &Send) -> Option<Reason> {
+fn too_long(lengths: &StringLimits, send: &Send) -> Option<Reason> {
     let named = send.payload.iter().flat_map(|payload| match &payload.kind {
         TermKind::Map(members) => members.as_slice(),
         _ => &[],
@@ -56,8 +54,8 @@ fn too_long(lengths: Option<&Value>, send: &Send) -> Option<Reason> {
         },
         _ => &[],
     };
-    let numerical = lengths?.get("idNumericalOnly").and_then(Value::as_bool) == Some(true);
-    let longest = limit(lengths, "idLen");
+    let numerical = lengths.id_numerical_only.is(true);
+    let longest = limit(&lengths.id_len);
     let mut ids = named.chain(operations.iter().filter_map(spelled));
     ids.find_map(|(length, digits)| {
         let needed = u64::try_from(length).unwrap_or(u64::MAX);
@@ -105,22 +103,33 @@ fn written(name: &str, value: &TermKind) -> Option<(usize, bool)> {
     Some((length.sum(), digits))
 }
 
-/// How long the arrays of a message are, by the names that factsheets have for them.
-fn sizes(send: &Send) -> Vec<(&'static str, u64)> {
+/// A limit of an array: what factsheets call it, and where it stands.
+type Limit = (Field, fn(&ArrayLimits) -> &Member<Number>);
+
+/// How long the arrays of a message are, by the limits that factsheets have for them.
+fn sizes(send: &Send) -> Vec<(Limit, u64)> {
+    const INSTANTS: Limit = (ArrayLimits::instant_actions, |all| &all.instant_actions);
+    const NODES: Limit = (ArrayLimits::order_nodes, |all| &all.order_nodes);
+    const EDGES: Limit = (ArrayLimits::order_edges, |all| &all.order_edges);
+    const NODE_STATES: Limit = (ArrayLimits::node_states, |all| &all.node_states);
+    const EDGE_STATES: Limit = (ArrayLimits::edge_states, |all| &all.edge_states);
+    const OF_NODE: Limit = (ArrayLimits::node_actions, |all| &all.node_actions);
+    const OF_EDGE: Limit = (ArrayLimits::edge_actions, |all| &all.edge_actions);
+    const PARAMETERS: Limit = (ArrayLimits::action_parameters, |all| &all.action_parameters);
     let count = |length: usize| u64::try_from(length).unwrap_or(u64::MAX);
-    let mut all = vec![("instantActions", count(send.actions.len()))];
+    let mut all = vec![(INSTANTS, count(send.actions.len()))];
     let mut parameters = send.actions.iter().map(|action| action.with.len()).max().unwrap_or(0);
     if let Some(route) = &send.route {
         let nodes = route.base.len() + route.horizon.len();
-        all.push(("order.nodes", count(nodes)));
-        all.push(("order.edges", count(nodes.saturating_sub(1))));
+        all.push((NODES, count(nodes)));
+        all.push((EDGES, count(nodes.saturating_sub(1))));
         // What the vehicle is to list of it.
-        all.push(("state.nodeStates", count(nodes)));
-        all.push(("state.edgeStates", count(nodes.saturating_sub(1))));
+        all.push((NODE_STATES, count(nodes)));
+        all.push((EDGE_STATES, count(nodes.saturating_sub(1))));
         for (place, actions) in &route.actions {
             let name = match place {
-                RoutePlace::Node(_) => "node.actions",
-                RoutePlace::Edge(..) => "edge.actions",
+                RoutePlace::Node(_) => OF_NODE,
+                RoutePlace::Edge(..) => OF_EDGE,
             };
             all.push((name, count(actions.len())));
             parameters = actions
@@ -129,7 +138,7 @@ fn sizes(send: &Send) -> Vec<(&'static str, u64)> {
                 .fold(parameters, usize::max);
         }
     }
-    all.push(("actions.actionsParameters", count(parameters)));
+    all.push((PARAMETERS, count(parameters)));
     all
 }
 
@@ -145,7 +154,8 @@ mod tests {
         let library = tck_testing::library();
         let tests = library.tests(Role::Agv, &library.rules.packs.latest().id);
         let test = tests.iter().find(|test| test.id.as_str() == id).expect(id);
-        outgrown(&json!({ "protocolLimits": limits }), test)
+        let sheet = json!({ "protocolLimits": limits });
+        outgrown(&crate::Sheet::read(&sheet, library.rules.packs.latest().names()), test)
     }
 
     #[test]

@@ -5,6 +5,7 @@ use tck_journal::event::{Event, Packet, Payload};
 use tck_journal::json::Parsed;
 use tck_judge::RunJudge;
 use tck_pack::Role;
+use tck_view::{MessageView, Topic};
 
 /// Who speaks instead of the device of the profile, as long as that one says nothing; only the tap can see it.
 pub(super) fn somebody_else(judge: &RunJudge) -> Option<String> {
@@ -50,10 +51,14 @@ fn said(entry: &Entry) -> Option<(&str, &Payload)> {
 fn text(judge: &RunJudge, topic: &str, payload: &Payload, levels: (&str, &str), name: &str) -> String {
     let ground = judge.ground();
     let parsed = Parsed::of(payload);
-    let header = |member: &str| parsed.value().and_then(|value| value.get(member)?.as_str());
+    let read = |value| MessageView::of_value(Topic::Other, value, ground.pack.names());
+    let message = parsed.value().map(read);
+    let header = message.as_ref().map(MessageView::header);
     let speaks = (
-        header("manufacturer").unwrap_or(levels.0),
-        header("serialNumber").unwrap_or(levels.1),
+        header.and_then(|header| header.manufacturer.text()).unwrap_or(levels.0),
+        header
+            .and_then(|header| header.serial_number.text())
+            .unwrap_or(levels.1),
     );
     let (manufacturer, serial) = &ground.identity;
     let expected = ground.topics.get(name).map_or("", String::as_str);

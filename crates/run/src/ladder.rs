@@ -4,7 +4,7 @@ use serde_json::{Map, Value, json};
 
 use super::between::power_cycle;
 use super::lasting::{self, Idle, has_ended, is_stalled, lasting};
-use super::rest::{Obstacle, place_of};
+use super::rest::Obstacle;
 use super::session::Session;
 use tck_base::clock::Moment;
 use tck_engine::{EngineError, Operator};
@@ -17,12 +17,13 @@ fn last_order_never_showed(judge: &RunJudge, since: Moment) -> bool {
     let Some((sent, order)) = judge.last_order().filter(|(sent, _)| *sent >= since) else {
         return false;
     };
-    let states = judge.timeline().of("state").iter().rev();
+    let timeline = judge.timeline();
+    let states = timeline.of("state").iter().rev();
     let mut later = states.take_while(|entry| entry.at().moment >= *sent).peekable();
     later.peek().is_some()
         && later.all(|entry| {
-            let shown = entry.json().and_then(|state| state.get("orderId")?.as_str());
-            shown != Some(order.as_str())
+            let shown = timeline.state(entry);
+            shown.is_none_or(|state| !state.order_id.is(order))
         })
 }
 
@@ -164,14 +165,19 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         let Some(before) = self.home.before.clone() else {
             return Ok(());
         };
-        let names = ["x", "y", "theta", "mapId"];
-        let position = names.map(|name| (name, before.pointer(&format!("/agvPosition/{name}")).cloned()));
-        let mut parameters: Vec<Value> = position
-            .into_iter()
-            .filter_map(|(key, value)| Some(json!({ "key": key, "value": value? })))
-            .collect();
-        let node = before.get("lastNodeId").cloned().unwrap_or_default();
-        parameters.push(json!({ "key": "lastNodeId", "value": node }));
+        let mut parameters = Vec::new();
+        let mut parameter = |key: &str, value: Value| parameters.push(json!({ "key": key, "value": value }));
+        if let Some(position) = before.position.there() {
+            for (key, member) in [("x", &position.x), ("y", &position.y), ("theta", &position.theta)] {
+                if let Some(value) = member.float() {
+                    parameter(key, value.into());
+                }
+            }
+            if let Some(map) = position.map_id.text() {
+                parameter("mapId", map.into());
+            }
+        }
+        parameter("lastNodeId", before.last_node_id.text().into());
         self.rung("initPosition to where it was before the test")?;
         self.instant_action("initPosition", Value::Array(parameters)).await?;
         self.rests_within(self.time("react")).await?;
@@ -180,8 +186,8 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
 
     /// An order of one node, where the vehicle stands: a new order clears what refusals have left.
     async fn order_where_it_stands(&mut self) -> Result<(), EngineError> {
-        let state = self.engine.recorder.judge().state().map(std::borrow::Cow::into_owned);
-        let node = state.as_ref().and_then(|state| state.get("lastNodeId")?.as_str());
+        let state = self.engine.recorder.judge().state();
+        let node = state.as_ref().and_then(|state| state.last_node_id.text());
         let node = node.and_then(|id| self.setup.layout.as_ref()?.node(id)).cloned();
         let Some(node) = node else { return Ok(()) };
         self.rung("an order of one node, where it stands")?;
@@ -197,15 +203,15 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
 
     /// An order from a temporary node where the vehicle stands to the nearest node, or the hook that does the same.
     async fn drive_to_a_node(&mut self) -> Result<(), EngineError> {
-        let state = self.engine.recorder.judge().state().map(std::borrow::Cow::into_owned);
+        let state = self.engine.recorder.judge().state();
         let (Some(state), Some(layout)) = (state, self.setup.layout.as_ref()) else {
             return Ok(());
         };
-        let Some((x, y)) = place_of(&state) else { return Ok(()) };
-        let map = state.pointer("/agvPosition/mapId").and_then(Value::as_str);
+        let Some(spot) = state.spot() else { return Ok(()) };
+        let (x, y) = (spot.x, spot.y);
         let on_map = layout
             .nodes()
-            .filter(|node| Some(node.map_id.as_str()) == map && !node.station);
+            .filter(|node| spot.map_id == node.map_id.as_str() && !node.station);
         let nearest = on_map.min_by(|one, other| one.distance(x, y).total_cmp(&other.distance(x, y)));
         let Some(nearest) = nearest.cloned() else { return Ok(()) };
         self.rung(&format!("an order from where it stands to node {:?}", nearest.id))?;
@@ -270,9 +276,8 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         let id = format!("{}-rest-{}", self.setup.run, self.orders);
         let until = self.engine.link.now().moment + self.time("slow");
         let shows = |recorder: &tck_engine::Recorder| {
-            let states = recorder.judge().timeline().of("state").iter().rev().take(20);
-            let mut orders = states.filter_map(|entry| entry.json()?.get("orderId")?.as_str());
-            orders.any(|order| order == id)
+            let mut states = recorder.judge().timeline().states_back().take(20);
+            states.any(|(_, state)| state.order_id.is(&id))
         };
         self.engine.watch(until, shows).await
     }

@@ -6,13 +6,15 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
-use super::rest::{Obstacle, is_over};
+use super::rest::Obstacle;
 use tck_base::clock::Moment;
 use tck_base::pattern::whole;
 use tck_journal::event::{Event, Reading, Waiver};
 use tck_judge::RunJudge;
+use tck_view::{ActionState, EdgeState, ErrorView, Field, Json, Names, NodeState, SafetyState, StateView};
+use tck_world::rest::{is_stopped, may_drive, open_actions, place};
 
 /// Two states of a vehicle that stands are at least so far apart.
 const APART: Duration = Duration::from_secs(1);
@@ -40,36 +42,55 @@ pub(super) fn lasting(judge: &RunJudge, obstacles: &[Obstacle], idle: &Idle) -> 
     all
 }
 
-fn waiver(member: &str, reading: Reading, about: &[&str], why: impl Into<String>) -> Waiver {
+fn waiver(member: impl Into<String>, reading: Reading, about: &[&str], why: impl Into<String>) -> Waiver {
     Waiver {
-        member: member.to_owned(),
+        member: member.into(),
         reading,
         about: about.iter().map(|id| (*id).to_owned()).collect(),
         why: why.into(),
     }
 }
 
+/// What the version of the run calls a member.
+fn called(names: &Names, member: Field) -> String {
+    names.name(member).unwrap_or_else(|| member.usual_name()).to_owned()
+}
+
+/// An object with these members.
+fn object<const N: usize>(names: &Names, members: [(Field, Value); N]) -> Value {
+    let named = members
+        .into_iter()
+        .map(|(member, value)| (called(names, member), value));
+    Value::Object(Map::from_iter(named))
+}
+
 /// Members that break the schema in a vehicle of which nothing was asked: what they mean is clear.
 fn broken_words(judge: &RunJudge) -> Vec<Waiver> {
-    let Some(state) = judge.timeline().present("state").and_then(|entry| entry.json()) else {
+    let timeline = judge.timeline();
+    let names = timeline.names();
+    let present = timeline.present("state");
+    let both = present.and_then(|entry| Some((entry.json()?, timeline.state(entry)?)));
+    let Some((message, state)) = both else {
         return Vec::new();
     };
     let Some(schema) = judge.ground().pack.schema("state") else {
         return Vec::new();
     };
-    let findings = schema.findings(state);
-    let broken = |member: &str| {
+    let findings = schema.findings(message);
+    let broken = |member: Field| {
+        let member = called(names, member);
         findings.iter().any(|finding| {
             let rest = finding
                 .path
                 .strip_prefix('/')
-                .and_then(|path| path.strip_prefix(member));
+                .and_then(|path| path.strip_prefix(&*member));
             rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
         })
     };
     let mut all = Vec::new();
-    let mut read_as = |member: &str, meant: Value, about: &[&str]| {
-        let shown = state.get(member).cloned();
+    let mut read_as = |member: Field, meant: Value, about: &[&str]| {
+        let shown = names.raw(message, &[member]).cloned();
+        let member = called(names, member);
         let why = match &shown {
             None => format!("`{member}` is missing in its states"),
             Some(shown) => {
@@ -84,35 +105,42 @@ fn broken_words(judge: &RunJudge) -> Vec<Waiver> {
         .pack
         .word("operatingMode.automatic")
         .unwrap_or("AUTOMATIC");
-    let mode = state.get("operatingMode").and_then(Value::as_str);
+    let mode = state.operating_mode.text();
     let unsaid = mode.is_none_or(|mode| mode.eq_ignore_ascii_case(automatic));
-    if broken("operatingMode") && unsaid {
+    if broken(StateView::operating_mode) && unsaid {
         let about = ["MODE-01", "STATE-01", "STATE-MSG-01", "JSON-01", "JSON-02"];
-        read_as("operatingMode", json!(automatic), &about);
+        read_as(StateView::operating_mode, json!(automatic), &about);
     }
-    let stop = state.pointer("/safetyState/eStop").and_then(Value::as_str);
+    let stop = state.emergency_stop();
     let stopped = ["AUTOACK", "MANUAL", "REMOTE"];
     let is_stopped = stop.is_some_and(|stop| stopped.iter().any(|word| stop.eq_ignore_ascii_case(word)));
-    if broken("safetyState") && !is_stopped {
-        let mut meant = state.get("safetyState").filter(|state| state.is_object()).cloned();
-        let meant_state = meant.get_or_insert_with(|| json!({ "fieldViolation": false }));
-        meant_state["eStop"] = json!("NONE");
+    if broken(StateView::safety_state) && !is_stopped {
+        let shown = names.raw(message, &[StateView::safety_state]);
+        let mut meant = shown.filter(|shown| shown.is_object()).cloned();
+        let meant_state = meant.get_or_insert_with(|| object(names, [(SafetyState::field_violation, json!(false))]));
+        meant_state[called(names, SafetyState::emergency_stop)] = json!("NONE");
         let about = ["STATE-MSG-17", "STATE-01", "STATE-MSG-01", "JSON-02"];
-        read_as("safetyState", meant_state.clone(), &about);
+        read_as(StateView::safety_state, meant_state.clone(), &about);
     }
-    for member in ["errors", "nodeStates", "edgeStates", "actionStates"] {
-        if broken(member) && state.get(member).is_none_or(Value::is_null) {
+    for member in [
+        StateView::errors,
+        StateView::node_states,
+        StateView::edge_states,
+        StateView::action_states,
+    ] {
+        if broken(member) && !state.presence(member).is_something() {
             read_as(member, json!([]), &["STATE-01", "STATE-MSG-01", "ERR-01", "JSON-10"]);
         }
     }
     let about = ["STATE-MSG-08", "STATE-08", "STATE-01"];
-    match state.get("driving") {
-        Some(Value::String(word)) if word.eq_ignore_ascii_case("false") => {
-            read_as("driving", json!(false), &about);
+    match state.driving.other().and_then(Json::text) {
+        Some(word) if word.eq_ignore_ascii_case("false") => {
+            read_as(StateView::driving, json!(false), &about);
             let shown = Some(json!(if word == "false" { "true" } else { "True" }));
-            let why = "`driving` is a text in its states";
+            let driving = called(names, StateView::driving);
+            let why = format!("`{driving}` is a text in its states");
             all.push(waiver(
-                "driving",
+                driving,
                 Reading::As {
                     shown,
                     meant: json!(true),
@@ -121,8 +149,9 @@ fn broken_words(judge: &RunJudge) -> Vec<Waiver> {
                 why,
             ));
         }
-        Some(Value::Bool(_)) => {}
-        _ if broken("driving") => read_as("driving", json!(false), &about),
+        _ if !state.driving.is_there() && broken(StateView::driving) => {
+            read_as(StateView::driving, json!(false), &about);
+        }
         _ => {}
     }
     all
@@ -132,10 +161,12 @@ fn broken_words(judge: &RunJudge) -> Vec<Waiver> {
 fn forgotten(judge: &RunJudge) -> Vec<Waiver> {
     let mut all = Vec::new();
     for (member, requirement) in judge.accused() {
-        if matches!(member.as_str(), "orderId" | "orderUpdateId") {
+        let names = judge.timeline().names();
+        let is = |field: Field| names.name(field) == Some(&*member);
+        if is(StateView::order_id) || is(StateView::order_update_id) {
             let why = format!("it forgets its `{member}`, which breaks {requirement}");
             let about = [requirement.as_str(), "ORD-CANCEL-08"];
-            all.push(waiver(&member, Reading::Kept, &about, why));
+            all.push(waiver(member, Reading::Kept, &about, why));
         }
     }
     all
@@ -144,35 +175,30 @@ fn forgotten(judge: &RunJudge) -> Vec<Waiver> {
 /// What is left of orders and actions that are over.
 fn left_over(judge: &RunJudge, obstacles: &[Obstacle], idle: &Idle) -> Vec<Waiver> {
     let Some(state) = judge.state() else { return Vec::new() };
+    let names = judge.timeline().names();
     let mut all = Vec::new();
     if obstacles.contains(&Obstacle::Order) {
-        let answered = idle.answered;
-        all.extend(passed(
-            &state,
-            answered,
-            "nodeStates",
-            &["STATE-12", "STATE-13", "NODE-03", "ORD-CANCEL-09", "ORD-CANCEL-11"],
-        ));
-        all.extend(passed(
-            &state,
-            answered,
-            "edgeStates",
-            &["STATE-12", "STATE-13", "NODE-05", "ORD-CANCEL-09", "ORD-CANCEL-11"],
-        ));
+        for (list, sequence, about) in [
+            (StateView::node_states, NodeState::sequence_id, "NODE-03"),
+            (StateView::edge_states, EdgeState::sequence_id, "NODE-05"),
+        ] {
+            let about = ["STATE-12", "STATE-13", about, "ORD-CANCEL-09", "ORD-CANCEL-11"];
+            all.extend(passed(judge, idle.answered, list, sequence, &about));
+        }
     }
     if (obstacles.contains(&Obstacle::Driving) && stays(judge, idle)) || stood_driving(judge, idle.test) {
         let about = ["STATE-MSG-08", "STATE-08", "ORD-UPD-01"];
         let why = "it says that it drives while it stands";
-        all.push(waiver("driving", Reading::Standing, &about, why));
+        all.push(waiver(
+            called(names, StateView::driving),
+            Reading::Standing,
+            &about,
+            why,
+        ));
     }
-    let actions = state
-        .get("actionStates")
-        .and_then(Value::as_array)
-        .into_iter()
-        .flatten();
-    let open: Vec<&Value> = actions.filter(|action| !is_over(action)).collect();
-    let is_own = |action: &&Value| {
-        let id = action.get("actionId").and_then(Value::as_str);
+    let open: Vec<&ActionState> = open_actions(&state).collect();
+    let is_own = |action: &&ActionState| {
+        let id = action.action_id.text();
         !has_known_status(action) || id.is_some_and(|id| instant(judge, id).is_some())
     };
     // What an order began may really be under way, as long as cancelOrder waits for it.
@@ -183,16 +209,19 @@ fn left_over(judge: &RunJudge, obstacles: &[Obstacle], idle: &Idle) -> Vec<Waive
         .iter()
         .any(|obstacle| matches!(obstacle, Obstacle::Mode(_) | Obstacle::EmergencyStop))
     {
-        let errors = state.get("errors").and_then(Value::as_array).into_iter().flatten();
         for obstacle in obstacles {
             let Obstacle::Fatal(kind) = obstacle else { continue };
-            let shown = errors
-                .clone()
-                .any(|error| error.get("errorType").and_then(Value::as_str) == Some(kind));
-            if shown && accepts_orders(judge, kind) {
-                let like = json!({ "errorLevel": "FATAL", "errorType": kind });
+            if shows_error(&state, kind) && accepts_orders(judge, kind) {
+                let members = [
+                    (ErrorView::error_level, json!("FATAL")),
+                    (ErrorView::error_type, json!(kind)),
+                ];
+                let reading = Reading::Without {
+                    like: object(names, members),
+                };
                 let why = format!("it keeps the FATAL error {kind:?}, and takes orders all the same");
-                all.push(waiver("errors", Reading::Without { like }, &["ERR-01", "ERR-04"], why));
+                let member = called(names, StateView::errors);
+                all.push(waiver(member, reading, &["ERR-01", "ERR-04"], why));
             }
         }
     }
@@ -200,56 +229,78 @@ fn left_over(judge: &RunJudge, obstacles: &[Obstacle], idle: &Idle) -> Vec<Waive
 }
 
 /// Nodes or edges that are listed after they were left; of an order that is over, those that were still to come.
-fn passed(state: &Value, answered: bool, member: &str, about: &[&str]) -> Vec<Waiver> {
-    let last = state.get("lastNodeSequenceId").and_then(whole);
-    let elements = state.get(member).and_then(Value::as_array).into_iter().flatten();
+fn passed(judge: &RunJudge, answered: bool, list: Field, sequence: Field, about: &[&str]) -> Vec<Waiver> {
+    let names = judge.timeline().names();
+    let Some(state) = judge.state_json() else {
+        return Vec::new();
+    };
+    let last = names.raw(&state, &[StateView::last_node_sequence_id]).and_then(whole);
+    let elements = names.raw_elements(&state, list).iter();
     let (behind, ahead): (Vec<&Value>, Vec<&Value>) = elements.partition(|element| {
-        let at = element.get("sequenceId").and_then(whole);
+        let at = names.raw(element, &[sequence]).and_then(whole);
         at.zip(last).is_some_and(|(at, last)| at <= last)
     });
+    let member = called(names, list);
     let mut all = Vec::new();
     if !behind.is_empty() {
         let why = format!("it keeps in its `{member}` what lies behind it");
-        all.push(waiver(member, Reading::Passed, about, why));
+        all.push(waiver(&*member, Reading::Passed, about, why));
     }
     // Nodes to come are an order, unless the vehicle says that there is none.
     for element in ahead.into_iter().filter(|_| answered).take(16) {
         let why = format!("it keeps in its `{member}` what was left of an order that is cancelled");
         let like = element.clone();
-        all.push(waiver(member, Reading::Without { like }, about, why));
+        all.push(waiver(&*member, Reading::Without { like }, about, why));
     }
     all
 }
 
 /// An action that does not end although nothing goes on: an instant action of ours by its type, any other by its id.
-fn unfinished(judge: &RunJudge, action: &Value) -> Vec<Waiver> {
-    let text = |name: &str| action.get(name).and_then(Value::as_str);
-    let Some(id) = text("actionId") else { return Vec::new() };
-    let status: String = text("actionStatus").unwrap_or("nothing").chars().take(40).collect();
+fn unfinished(judge: &RunJudge, action: &ActionState) -> Vec<Waiver> {
+    let names = judge.timeline().names();
+    let Some(id) = action.action_id.text() else {
+        return Vec::new();
+    };
+    let status = action.action_status.text();
+    let shown: String = status.unwrap_or("nothing").chars().take(40).collect();
     let about = ["IACT-04", "ORD-CANCEL-07", "ORD-CANCEL-13", "STATE-MSG-14", "ASTATE-05"];
     if !has_known_status(action) {
-        return strange_status(text("actionStatus").unwrap_or_default());
+        return strange_status(names, status.unwrap_or_default());
     }
-    if let Some(kind) = instant(judge, id) {
-        let like = json!({ "actionType": kind, "actionStatus": status });
-        let why = format!("it leaves {kind} {status}");
-        let named = text("actionType") == Some(kind.as_str());
-        let like = if named { like } else { json!({ "actionId": id }) };
-        return vec![waiver("actionStates", Reading::Without { like }, &about, why)];
-    }
-    let why = format!("it leaves action {id:?} of an order that is over {status}");
-    let like = json!({ "actionId": id });
-    vec![waiver("actionStates", Reading::Without { like }, &about, why)]
+    let by_id = || object(names, [(ActionState::action_id, json!(id))]);
+    let (like, why) = match instant(judge, id) {
+        Some(kind) => {
+            let why = format!("it leaves {kind} {shown}");
+            let like = match action.action_type.is(&kind) {
+                true => object(
+                    names,
+                    [
+                        (ActionState::action_type, json!(kind)),
+                        (ActionState::action_status, json!(shown)),
+                    ],
+                ),
+                false => by_id(),
+            };
+            (like, why)
+        }
+        None => {
+            let why = format!("it leaves action {id:?} of an order that is over {shown}");
+            (by_id(), why)
+        }
+    };
+    let member = called(names, StateView::action_states);
+    vec![waiver(member, Reading::Without { like }, &about, why)]
 }
 
 /// A word for a status that is none: of an action that is over, it means that it is finished. Known words in another
 /// spelling mean what they say.
-fn strange_status(shown: &str) -> Vec<Waiver> {
+fn strange_status(names: &Names, shown: &str) -> Vec<Waiver> {
     let known = ["WAITING", "INITIALIZING", "RUNNING", "PAUSED", "FINISHED", "FAILED"];
     let about = ["STATE-MSG-14", "ASTATE-05", "JSON-02"];
     let one = |shown: String, meant: &str, why: String| {
         let meant = meant.to_owned();
-        waiver("actionStates", Reading::Status { shown, meant }, &about, why)
+        let member = called(names, StateView::action_states);
+        waiver(member, Reading::Status { shown, meant }, &about, why)
     };
     let Some(meant) = known.iter().find(|word| word.eq_ignore_ascii_case(shown)) else {
         let word: String = shown.chars().take(40).collect();
@@ -270,9 +321,11 @@ fn strange_status(shown: &str) -> Vec<Waiver> {
     all.map(|word| one(spelled(word), word, why.clone())).collect()
 }
 
-fn has_known_status(action: &Value) -> bool {
-    let status = action.get("actionStatus").and_then(Value::as_str);
-    status.is_some_and(|status| ["WAITING", "INITIALIZING", "RUNNING", "PAUSED"].contains(&status))
+fn has_known_status(action: &ActionState) -> bool {
+    matches!(
+        action.action_status.text(),
+        Some("WAITING" | "INITIALIZING" | "RUNNING" | "PAUSED")
+    )
 }
 
 /// The type of an instant action the harness has sent, if it is one that needs nothing of the vehicle.
@@ -291,14 +344,14 @@ fn instant(judge: &RunJudge, id: &str) -> Option<String> {
 
 /// Whether the states since then show the vehicle at one place.
 fn stays(judge: &RunJudge, idle: &Idle) -> bool {
-    let states = judge.timeline().of("state").iter().rev();
+    let timeline = judge.timeline();
+    let states = timeline.of("state").iter().rev();
     let since: Vec<_> = states.take_while(|entry| entry.at().moment >= idle.since).collect();
     let long = match (since.first(), since.last()) {
         (Some(last), Some(first)) => last.at().moment.since(first.at().moment) * 2 >= idle.patience,
         _ => false,
     };
-    let place = |entry: &tck_journal::Entry| entry.json().and_then(super::rest::place_of);
-    let mut places = since.iter().map(|entry| place(entry));
+    let mut places = since.iter().map(|entry| place(timeline.state(entry)?));
     let first = places.next().flatten();
     long && since.len() > 1 && first.is_some() && places.all(|place| place == first)
 }
@@ -306,26 +359,20 @@ fn stays(judge: &RunJudge, idle: &Idle) -> bool {
 /// Whether the vehicle has said that it drives while it waited, in two states apart: it stands where it stood, no node to
 /// come is released, and no action is under way.
 fn stood_driving(judge: &RunJudge, since: Moment) -> bool {
-    let states = judge.timeline().of("state").iter().rev();
-    let mut later: Option<&tck_journal::Entry> = None;
-    for entry in states.take_while(|entry| entry.at().moment >= since) {
-        let Some(state) = entry.json() else { continue };
-        let list = |name: &str| state.get(name).and_then(Value::as_array).into_iter().flatten();
-        let ahead = list("nodeStates").any(|node| node.get("released") == Some(&Value::Bool(true)));
-        let waits = list("nodeStates").next().is_some() && !ahead && list("actionStates").all(is_over_or_waits);
-        if state.get("driving") != Some(&Value::Bool(true)) || !waits {
+    let states = judge.timeline().states_back();
+    let mut later = None;
+    for (entry, state) in states.take_while(|(entry, _)| entry.at().moment >= since) {
+        let waits = !state.node_states.is_empty() && !may_drive(state) && nothing_is_done(state);
+        if !state.driving.is(true) || !waits {
             later = None;
             continue;
         }
-        let stood = later.is_some_and(|later| {
-            let apart = later.at().moment.since(entry.at().moment);
-            let same = later.json().and_then(super::rest::place_of) == super::rest::place_of(state);
-            apart >= APART && same && super::rest::place_of(state).is_some()
-        });
-        if stood {
+        let (at, here) = (entry.at().moment, place(state));
+        let stood = later.is_some_and(|(later, there): (Moment, _)| later.since(at) >= APART && there == here);
+        if stood && here.is_some() {
             return true;
         }
-        later.get_or_insert(entry);
+        later.get_or_insert((at, here));
     }
     false
 }
@@ -333,65 +380,51 @@ fn stood_driving(judge: &RunJudge, since: Moment) -> bool {
 /// Whether the vehicle has said for so long that it drives a released way, and has not moved, although nothing in its
 /// states holds it: something in it has died, and it will not move in the next test either.
 pub(super) fn is_stalled(judge: &RunJudge, since: Moment, patience: Duration) -> bool {
-    let states = judge.timeline().of("state").iter().rev();
-    let mut later: Option<&tck_journal::Entry> = None;
-    for entry in states.take_while(|entry| entry.at().moment >= since) {
-        let Some(state) = entry.json() else { continue };
-        let list = |name: &str| state.get(name).and_then(Value::as_array).into_iter().flatten();
-        let is = |path: &str| state.pointer(path) == Some(&Value::Bool(true));
-        let stopped = state.pointer("/safetyState/eStop").is_some_and(|stop| stop != "NONE");
-        let held = is("/paused") || is("/safetyState/fieldViolation") || stopped;
-        let ahead = list("nodeStates").any(|node| node.get("released") == Some(&Value::Bool(true)));
-        if !is("/driving") || held || !ahead || !list("actionStates").all(is_over_or_waits) {
+    let states = judge.timeline().states_back();
+    let mut later: Option<(Moment, Option<(f64, f64)>)> = None;
+    for (entry, state) in states.take_while(|(entry, _)| entry.at().moment >= since) {
+        let held = state.paused.is(true) || state.field_violation() == Some(true) || is_stopped(state);
+        if !state.driving.is(true) || held || !may_drive(state) || !nothing_is_done(state) {
             later = None;
             continue;
         }
-        let place = super::rest::place_of(state);
+        let (at, here) = (entry.at().moment, place(state));
         match later {
-            Some(later) if place.is_some() && later.json().and_then(super::rest::place_of) == place => {
-                if later.at().moment.since(entry.at().moment) >= patience {
+            Some((later, there)) if here.is_some() && there == here => {
+                if later.since(at) >= patience {
                     return true;
                 }
             }
-            _ => later = Some(entry),
+            _ => later = Some((at, here)),
         }
     }
     false
 }
 
-fn is_over_or_waits(action: &Value) -> bool {
-    is_over(action) || action.get("actionStatus").and_then(Value::as_str) == Some("WAITING")
+/// Whether every action is over, or has not begun.
+fn nothing_is_done(state: &StateView) -> bool {
+    open_actions(state).all(|action| action.action_status.is("WAITING"))
+}
+
+fn shows_error(state: &StateView, kind: &str) -> bool {
+    state.errors.iter().any(|error| error.error_type.is(kind))
 }
 
 /// Whether the vehicle has taken over an order while it showed this error.
 fn accepts_orders(judge: &RunJudge, kind: &str) -> bool {
-    let states = judge.timeline().of("state");
     let mut orders = BTreeSet::new();
-    for state in states.iter().rev().filter_map(|entry| entry.json()).take(500) {
-        let errors = state.get("errors").and_then(Value::as_array).into_iter().flatten();
-        let mut kinds = errors.filter_map(|error| error.get("errorType").and_then(Value::as_str));
-        if !kinds.any(|one| one == kind) {
-            break;
-        }
-        orders.extend(state.get("orderId").and_then(Value::as_str));
+    let states = judge.timeline().states_back().take(500);
+    for (_, state) in states.take_while(|(_, state)| shows_error(state, kind)) {
+        orders.extend(state.order_id.text());
     }
     orders.len() > 1
 }
 
 /// Whether the vehicle has ended the action of this id.
 pub(super) fn has_ended(judge: &RunJudge, id: &str) -> bool {
-    let states = judge
-        .timeline()
-        .of("state")
-        .iter()
-        .rev()
-        .filter_map(|entry| entry.json());
-    let status = states.take(20).find_map(|state| {
-        let mut all = state.get("actionStates")?.as_array()?.iter();
-        let one = all.find(|one| one.get("actionId").and_then(Value::as_str) == Some(id))?;
-        one.get("actionStatus")?.as_str().map(str::to_owned)
-    });
-    status.is_some_and(|status| !["WAITING", "INITIALIZING", "RUNNING", "PAUSED"].contains(&status.as_str()))
+    let mut states = judge.timeline().states_back().take(20);
+    let known = states.find_map(|(_, state)| state.action(id).filter(|action| action.action_status.is_there()));
+    known.is_some_and(|action| !has_known_status(action))
 }
 
 /// What the journal says about a waiver.

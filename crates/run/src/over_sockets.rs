@@ -17,6 +17,7 @@ use super::request::Request;
 use super::selection::Selection;
 use super::session::{Finished, Patience, Progress, run};
 use super::setup::{BenchFacts, DeviceUnderTest};
+use super::sheet::Sheet;
 use super::site::{Topics, bench_of, certificates, reach, resolve};
 use super::virtual_run::{Silent, VirtualRun, run_silently};
 use tck_base::clock::WallClock;
@@ -446,12 +447,13 @@ impl Stage<'_> {
 }
 
 /// What a built-in vehicle says it can do.
-fn factsheet_of(device: &BuiltIn, library: &Library, pack: &Pack) -> Option<Value> {
+fn factsheet_of(device: &BuiltIn, library: &Library, pack: &Pack) -> Option<Sheet> {
     let mut run = VirtualRun::of_role(device.role(), library, pack);
     run.device = device.clone();
     run.tests = Selection::default();
     let finished = run_silently(library, pack, run).ok()?;
     let timeline = finished.recorder.judge().timeline();
-    let sheets = timeline.of("factsheet");
-    sheets.iter().rev().find_map(|entry| entry.json().cloned())
+    let mut sheets = timeline.of("factsheet").iter().rev();
+    let message = sheets.find_map(|entry| entry.json())?;
+    Some(Sheet::read(message, timeline.names()))
 }

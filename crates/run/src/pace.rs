@@ -2,6 +2,7 @@
 //! vehicle itself says it can do, which it must notice and a slow vehicle can still keep.
 
 use serde_json::{Map, Value};
+use tck_view::{FactsheetView, Member, Number, PhysicalParameters};
 
 /// The share of the highest speed that is asked for. Far enough below it to be told from a vehicle that ignores the
 /// limit, and no crawling.
@@ -15,6 +16,11 @@ const LOOKS: f64 = 8.0;
 
 /// Between two looks at least and at most, in milliseconds.
 const BETWEEN: (f64, f64) = (20.0, 3_000.0);
+
+/// The edges of a course, and members of each.
+const MAX_SPEED: &str = "maxSpeed";
+const LENGTH: &str = "length";
+const EDGES: &str = "edges";
 
 /// The edge whose length sets the pace.
 const FIRST_EDGE: &str = "a-b";
@@ -32,15 +38,19 @@ fn share(least: Option<f64>, most: Option<f64>) -> f64 {
 }
 
 impl Pace {
-    /// Reads `physicalParameters`.
-    pub(super) fn of(factsheet: Option<&Value>) -> Self {
-        let number = |name: &str| {
-            let value = factsheet?.get("physicalParameters")?.get(name)?.as_f64()?;
-            (value.is_finite() && value > 0.0).then_some(value)
+    /// Reads the physical parameters.
+    pub(super) fn of(factsheet: Option<&FactsheetView>) -> Self {
+        let physical = factsheet.and_then(|sheet| sheet.physical_parameters.there());
+        let number = |of: fn(&PhysicalParameters) -> &Member<Number>| {
+            let value = of(physical?).float()?;
+            (value > 0.0).then_some(value)
         };
         Self {
-            speed: (number("speedMin"), number("speedMax")),
-            turning: (number("angularSpeedMin"), number("angularSpeedMax")),
+            speed: (number(|all| &all.speed_min), number(|all| &all.speed_max)),
+            turning: (
+                number(|all| &all.angular_speed_min),
+                number(|all| &all.angular_speed_max),
+            ),
         }
     }
 
@@ -61,13 +71,13 @@ impl Pace {
 
     /// Adds `slowSpeed` and `slowRotation` to every edge of the course.
     pub(super) fn set(self, course: &mut Value) {
-        let edges = course.get_mut("edges").and_then(Value::as_object_mut);
+        let edges = course.get_mut(EDGES).and_then(Value::as_object_mut);
         for members in edges
             .into_iter()
             .flat_map(Map::values_mut)
             .filter_map(Value::as_object_mut)
         {
-            let cap = members.get("maxSpeed").and_then(Value::as_f64);
+            let cap = members.get(MAX_SPEED).and_then(Value::as_f64);
             members.insert("slowSpeed".to_owned(), self.speed(cap).into());
             members.insert("slowRotation".to_owned(), share(self.turning.0, self.turning.1).into());
         }
@@ -76,8 +86,8 @@ impl Pace {
 
 /// `time.look` in milliseconds: some looks fit into a slow drive over the first edge of the course.
 pub(super) fn between_looks(course: &Value) -> Option<u64> {
-    let edge = course.get("edges")?.get(FIRST_EDGE)?;
-    let length = edge.get("length")?.as_f64()?;
+    let edge = course.get(EDGES)?.get(FIRST_EDGE)?;
+    let length = edge.get(LENGTH)?.as_f64()?;
     let speed = edge.get("slowSpeed")?.as_f64()?;
     let millis = (length / speed / LOOKS * 1_000.0).clamp(BETWEEN.0, BETWEEN.1);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped above")]
@@ -88,10 +98,12 @@ pub(super) fn between_looks(course: &Value) -> Option<u64> {
 mod tests {
     use super::*;
     use serde_json::json;
+    use tck_view::Names;
 
     fn course(sheet: Option<&Value>, edge: Value) -> Value {
         let mut course = json!({ "edges": { "a-b": edge } });
-        Pace::of(sheet).set(&mut course);
+        let sheet = sheet.map(|sheet| crate::Sheet::read(sheet, &Names::default()));
+        Pace::of(sheet.as_deref()).set(&mut course);
         course
     }
 

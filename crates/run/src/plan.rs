@@ -149,7 +149,7 @@ impl RunPlan {
         let running: Vec<&Test> = tests.iter().map(AsRef::as_ref).filter(|test| may_run(test)).collect();
         let estimate = Estimate::of(
             Some(time),
-            setup.capabilities.factsheet.as_ref(),
+            setup.capabilities.factsheet.as_deref(),
             setup.layout.as_ref(),
             Duration::from_secs(1),
         );

@@ -8,6 +8,7 @@ use tck_journal::Vantage;
 use tck_journal::event::Event;
 use tck_judge::{RunJudge, Sign};
 use tck_pack::Role;
+use tck_view::{MessageView, Topic};
 
 /// Whether the device is connected, as far as the harness can see.
 pub(super) enum Presence {
@@ -27,14 +28,12 @@ impl Presence {
             Vantage::Tap => has_open_connection(judge),
             Vantage::Subscriber => {
                 let said = judge.timeline().of("connection").last();
-                let online = judge.ground().pack.word("connection.online");
-                let state = said.and_then(|entry| entry.json()?.get("connectionState")?.as_str());
                 let fresh = judge
                     .timeline()
                     .of("state")
                     .last()
                     .is_some_and(|entry| !is_stale(entry));
-                let there = if said.is_some() { state == online } else { fresh };
+                let there = said.map_or(fresh, |said| is_online(judge, said));
                 there && !is_silent(judge)
             }
         };
@@ -52,8 +51,14 @@ pub(super) fn says_online(judge: &RunJudge) -> bool {
     let Some(said) = judge.timeline().of("connection").last() else {
         return true;
     };
-    let state = said.json().and_then(|message| message.get("connectionState")?.as_str());
-    state == judge.ground().pack.word("connection.online")
+    is_online(judge, said)
+}
+
+/// Whether a connection message says that the device is online.
+fn is_online(judge: &RunJudge, said: &Entry) -> bool {
+    let message = judge.timeline().view(said, Topic::Connection);
+    let message = message.and_then(MessageView::connection);
+    message.is_some_and(|message| message.is_online())
 }
 
 /// How the device shows without a tap that it is gone.

@@ -3,13 +3,15 @@
 //! This is the one judgement on which the preambles rely, the way back after a test, and the decision to restart a
 //! vehicle. Lasting mistakes that are known are read over.
 
-use serde_json::Value;
+use std::sync::Arc;
 
 use super::presence::says_online;
 use tck_base::clock::Moment;
 use tck_course::Layout;
 use tck_judge::RunJudge;
 use tck_pack::Pack;
+use tck_view::{Member, Position, StateView, Text};
+use tck_world::rest::{has_order, is_stopped, open_actions, place};
 
 /// How far from its last node a vehicle may stand to be on it, in metres, unless the node allows more.
 const ON_NODE: f64 = 0.5;
@@ -85,25 +87,21 @@ impl Obstacle {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Home {
     /// Its first state.
-    pub(super) first: Option<Value>,
+    pub(super) first: Option<Arc<StateView>>,
     /// When the running test began.
     pub(super) since: Moment,
     /// Its state when the running test began.
-    pub(super) before: Option<Value>,
+    pub(super) before: Option<Arc<StateView>>,
 }
 
 impl Home {
-    fn shown<'h>(&'h self, path: &str) -> Option<&'h Value> {
-        self.before.as_ref()?.pointer(path)
-    }
-
     /// Everything that is in the way; empty for a vehicle at rest.
     pub(super) fn obstacles(&self, judge: &RunJudge, layout: Option<&Layout>) -> Vec<Obstacle> {
         let mut all = Vec::new();
         if !says_online(judge) {
             all.push(Obstacle::NotOnline);
         }
-        let ever = judge.timeline().of("state").iter().any(|entry| entry.json().is_some());
+        let ever = judge.timeline().states_back().next().is_some();
         let Some(state) = judge.state() else {
             all.extend(ever.then_some(Obstacle::NoState));
             return all;
@@ -112,71 +110,58 @@ impl Home {
         all
     }
 
-    fn of_state(&self, state: &Value, pack: &Pack, layout: Option<&Layout>, all: &mut Vec<Obstacle>) {
-        let text = |path: &str| state.pointer(path).and_then(Value::as_str);
-        let is = |path: &str| state.pointer(path).and_then(Value::as_bool).unwrap_or(false);
-        let list = |name: &str| state.get(name).and_then(Value::as_array).into_iter().flatten();
-        if list("nodeStates").chain(list("edgeStates")).next().is_some() {
+    fn of_state(&self, state: &StateView, pack: &Pack, layout: Option<&Layout>, all: &mut Vec<Obstacle>) {
+        let short = |text: &Member<Text>| -> String { text.or_empty().chars().take(64).collect() };
+        if has_order(state) {
             all.push(Obstacle::Order);
         }
-        if is("/driving") {
+        if state.driving.is(true) {
             all.push(Obstacle::Driving);
         }
-        all.extend(list("actionStates").filter(|action| !is_over(action)).map(|action| {
-            let id = action.get("actionId").and_then(Value::as_str).unwrap_or_default();
-            Obstacle::Action(id.chars().take(64).collect())
-        }));
-        if is("/paused") {
+        all.extend(open_actions(state).map(|action| Obstacle::Action(short(&action.action_id))));
+        if state.paused.is(true) {
             all.push(Obstacle::Paused);
         }
         let usual = ["operatingMode.automatic", "operatingMode.semiautomatic"];
-        if let Some(mode) = text("/operatingMode")
+        if let Some(mode) = state.operating_mode.text()
             && !usual.iter().any(|word| pack.word(word) == Some(mode))
         {
-            all.push(Obstacle::Mode(mode.chars().take(64).collect()));
+            all.push(Obstacle::Mode(short(&state.operating_mode)));
         }
-        if text("/safetyState/eStop").is_some_and(|stop| stop != "NONE") {
+        if is_stopped(state) {
             all.push(Obstacle::EmergencyStop);
         }
-        let fatal = list("errors").filter(|error| error.get("errorLevel").and_then(Value::as_str) == Some("FATAL"));
-        let kinds = fatal.filter_map(|error| error.get("errorType").and_then(Value::as_str));
+        let fatal = state.errors.iter().filter(|error| error.error_level.is("FATAL"));
+        let kinds = fatal.filter_map(|error| error.error_type.text());
         all.extend(
             kinds
                 .filter(|kind| !REFUSALS.iter().any(|word| pack.word(word) == Some(kind)))
                 .map(|kind| Obstacle::Fatal(kind.chars().take(64).collect())),
         );
-        let charged = self.shown("/batteryState/charging") == Some(&Value::Bool(true));
-        if is("/batteryState/charging") && !charged {
+        let was = |so: fn(&StateView) -> bool| self.before.as_ref().is_some_and(|before| so(before));
+        let charges = |state: &StateView| state.charging() == Some(true);
+        if charges(state) && !was(charges) {
             all.push(Obstacle::Charging);
         }
-        let had_load = self
-            .shown("/loads")
-            .and_then(Value::as_array)
-            .is_some_and(|loads| !loads.is_empty());
-        if list("loads").next().is_some() && !had_load {
+        let is_laden = |state: &StateView| !state.loads.is_empty();
+        if is_laden(state) && !was(is_laden) {
             all.push(Obstacle::Load);
         }
         self.of_place(state, layout, all);
     }
 
-    fn of_place(&self, state: &Value, layout: Option<&Layout>, all: &mut Vec<Obstacle>) {
+    fn of_place(&self, state: &StateView, layout: Option<&Layout>, all: &mut Vec<Obstacle>) {
         let Some(layout) = layout else { return };
-        let initialized = |state: &Value| {
-            state
-                .pointer("/agvPosition/positionInitialized")
-                .and_then(Value::as_bool)
+        let now = state.position.there();
+        let before = self.before.as_ref().and_then(|before| before.position.there());
+        let is = |position: Option<&Position>, known| position.is_some_and(|it| it.initialized.is(known));
+        let map = |position: &Position| {
+            let map = position.map_id.text()?;
+            Some(map.chars().take(64).collect::<String>())
         };
-        let map = |state: &Value| {
-            let map = state.pointer("/agvPosition/mapId").and_then(Value::as_str);
-            map.map(|map| map.chars().take(64).collect::<String>())
-        };
-        let was_known = self
-            .before
-            .as_ref()
-            .is_some_and(|before| initialized(before) == Some(true));
-        let now = map(state);
-        let lost = initialized(state) == Some(false) && was_known;
-        let strange = match (&now, self.before.as_ref().and_then(map)) {
+        let lost = is(now, false) && is(before, true);
+        let now = now.and_then(map);
+        let strange = match (&now, before.and_then(map)) {
             (Some(now), Some(before)) => *now != before && !layout.nodes().any(|node| node.map_id == *now),
             _ => false,
         };
@@ -189,35 +174,25 @@ impl Home {
 
     /// Whether the vehicle stands off its last node. A vehicle whose position did not fit its node to begin with, or
     /// that always shows the same, is not measured by it.
-    pub(super) fn is_between_nodes(&self, state: &Value, layout: &Layout) -> bool {
-        let away = |state: &Value| {
-            let node = layout.node(state.get("lastNodeId")?.as_str()?)?;
-            let (x, y) = place_of(state)?;
-            let same_map = state.pointer("/agvPosition/mapId").and_then(Value::as_str) == Some(node.map_id.as_str());
-            let distance = node.distance(x, y);
-            same_map.then(|| (distance > node.deviation_xy.unwrap_or(0.0).max(ON_NODE), distance))
+    pub(super) fn is_between_nodes(&self, state: &StateView, layout: &Layout) -> bool {
+        let away = |state: &StateView| {
+            let node = layout.node(state.last_node_id.text()?)?;
+            let spot = state.spot()?;
+            let distance = node.distance(spot.x, spot.y);
+            let is_off = distance > node.deviation_xy.unwrap_or(0.0).max(ON_NODE);
+            (spot.map_id == node.map_id.as_str()).then_some((is_off, distance))
         };
-        let fitted = self.first.as_ref().and_then(away).is_some_and(|(away, _)| !away);
-        let moved = self.first.as_ref().and_then(place_of) != place_of(state);
+        let first = self.first.as_deref();
+        let fitted = first.and_then(away).is_some_and(|(away, _)| !away);
+        let moved = first.and_then(place) != place(state);
         fitted && moved && away(state).is_some_and(|(away, distance)| away && distance < AN_EDGE)
     }
 }
 
-/// Where a state shows the vehicle.
-pub(super) fn place_of(state: &Value) -> Option<(f64, f64)> {
-    let at = |path: &str| state.pointer(path).and_then(Value::as_f64);
-    Some((at("/agvPosition/x")?, at("/agvPosition/y")?))
-}
-
-/// Whether an action is over.
-pub(super) fn is_over(action: &Value) -> bool {
-    let status = action.get("actionStatus").and_then(Value::as_str);
-    matches!(status, Some("FINISHED" | "FAILED"))
-}
-
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
+    use serde_json::{Value, json};
+    use tck_view::{MessageView, Names, Topic};
 
     use super::*;
 
@@ -236,14 +211,19 @@ mod tests {
         at(node, found.x, found.y)
     }
 
-    fn places(first: Value, now: &Value) -> Vec<Obstacle> {
+    fn view(state: &Value) -> Arc<StateView> {
+        let view = MessageView::of_value(Topic::State, state, &Names::default());
+        Arc::clone(view.state().unwrap())
+    }
+
+    fn places(first: &Value, now: &Value) -> Vec<Obstacle> {
         let home = Home {
-            before: Some(first.clone()),
-            first: Some(first),
+            before: Some(view(first)),
+            first: Some(view(first)),
             ..Home::default()
         };
         let mut all = Vec::new();
-        home.of_place(now, Some(&layout()), &mut all);
+        home.of_place(&view(now), Some(&layout()), &mut all);
         all
     }
 
@@ -252,8 +232,8 @@ mod tests {
         let layout = layout();
         let node = layout.nodes().next().unwrap();
         let off = at(&node.id, node.x + 1.85, node.y);
-        assert_eq!(places(on(&node.id), &off), [Obstacle::Place]);
-        assert_eq!(places(on(&node.id), &at(&node.id, node.x + 0.1, node.y)), []);
+        assert_eq!(places(&on(&node.id), &off), [Obstacle::Place]);
+        assert_eq!(places(&on(&node.id), &at(&node.id, node.x + 0.1, node.y)), []);
     }
 
     #[test]
@@ -261,9 +241,9 @@ mod tests {
         let layout = layout();
         let node = layout.nodes().next().unwrap();
         let odd = at(&node.id, node.x + 20.0, node.y);
-        assert_eq!(places(odd, &at(&node.id, node.x + 1.85, node.y)), []);
+        assert_eq!(places(&odd, &at(&node.id, node.x + 1.85, node.y)), []);
         let in_millimetres = at(&node.id, node.x + 2000.0, node.y);
-        assert_eq!(places(on(&node.id), &in_millimetres), []);
+        assert_eq!(places(&on(&node.id), &in_millimetres), []);
     }
 
     #[test]
@@ -272,6 +252,6 @@ mod tests {
         let node = layout.nodes().next().unwrap();
         let mut lost = on(&node.id);
         lost["agvPosition"]["mapId"] = json!("no-such-map");
-        assert_eq!(places(on(&node.id), &lost), [Obstacle::Map("no-such-map".to_owned())]);
+        assert_eq!(places(&on(&node.id), &lost), [Obstacle::Map("no-such-map".to_owned())]);
     }
 }

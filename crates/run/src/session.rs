@@ -14,6 +14,7 @@ use super::estimate::{self, Estimate, Outlook};
 use super::presence::{Presence, gone};
 use super::rest::{Home, Obstacle};
 use super::risk::by_risk;
+use super::sheet::Sheet;
 use super::strikes::Strikes;
 use tck_base::clock::Moment;
 use tck_base::verdict::Verdict;
@@ -374,7 +375,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         let times = self.engine.recorder.judge().ground().bindings.get("time");
         let estimate = Estimate::of(
             times,
-            self.setup.capabilities.factsheet.as_ref(),
+            self.setup.capabilities.factsheet.as_deref(),
             self.setup.layout.as_ref(),
             self.engine.operator.usual_time(),
         );
@@ -404,12 +405,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
     }
 
     fn plan(&self, tests: Vec<PlannedTest>) -> Plan {
-        let series = self
-            .setup
-            .capabilities
-            .factsheet
-            .as_ref()
-            .and_then(|sheet| sheet.pointer("/typeSpecification/seriesName"));
+        let series = self.setup.capabilities.factsheet.as_ref().and_then(Sheet::series);
         let mut limits = self.setup.limits.clone();
         if let Err(why) = &self.setup.capabilities.motion {
             limits.push(format!("No test that moves the vehicle was run: {why}."));
@@ -423,9 +419,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             capabilities: self.setup.capabilities.list(),
             limits,
             deviations: self.setup.deviations.clone(),
-            series_name: series
-                .and_then(Value::as_str)
-                .map(|name| name.chars().take(200).collect()),
+            series_name: series.map(|name| name.chars().take(200).collect()),
             complete: self.setup.complete,
             repeat: (self.setup.repeat > 1).then_some(self.setup.repeat),
         }
@@ -511,7 +505,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
     }
 
     fn look_at_home(&mut self) {
-        self.home.before = self.engine.recorder.judge().state().map(std::borrow::Cow::into_owned);
+        self.home.before = self.engine.recorder.judge().state();
         self.home.since = self.engine.link.now().moment;
     }
 

@@ -4,9 +4,8 @@
 use std::fmt;
 use std::time::Duration;
 
-use serde_json::Value;
-
 use tck_base::clock::{Moment, Stamp};
+use tck_view::{ConnectionView, ErrorView, StateView};
 
 /// A vehicle that is ONLINE and says nothing for so long has fallen silent: the standard allows 30 s between two states, and a
 /// second is left to the transport.
@@ -99,11 +98,11 @@ impl Alarms {
     }
 
     /// What its connection topic says; `stored` ones tell of the past.
-    pub(crate) fn connection(&mut self, said: Option<&str>, at: Stamp, stored: bool) -> Option<Alarm> {
-        let broken = said == Some("CONNECTIONBROKEN");
+    pub(crate) fn connection(&mut self, said: &ConnectionView, at: Stamp, stored: bool) -> Option<Alarm> {
+        let broken = said.connection_state.is("CONNECTIONBROKEN");
         let is_news = broken && !self.broken && !stored;
         self.broken = broken;
-        if said == Some("ONLINE") {
+        if said.is_online() {
             self.due_since.get_or_insert(at.moment);
         } else {
             (self.due_since, self.silent) = (None, false);
@@ -112,7 +111,7 @@ impl Alarms {
     }
 
     /// A state that came live.
-    pub(crate) fn state(&mut self, state: &Value, at: Stamp) -> Vec<Alarm> {
+    pub(crate) fn state(&mut self, state: &StateView, at: Stamp) -> Vec<Alarm> {
         let mut all = Vec::new();
         if std::mem::take(&mut self.silent) {
             let since = self.due_since.unwrap_or(at.moment);
@@ -122,20 +121,15 @@ impl Alarms {
         if self.due_since.is_some() {
             self.due_since = Some(at.moment);
         }
-        let errors = state.get("errors").and_then(Value::as_array).into_iter().flatten();
-        let fatal = errors
-            .take(ERRORS)
-            .filter(|error| error.get("errorLevel").and_then(Value::as_str) == Some("FATAL"));
-        let mut fatal: Vec<String> = fatal
-            .map(|error| error.get("errorType").and_then(Value::as_str).unwrap_or("?"))
-            .map(cut)
-            .collect();
+        let errors = state.errors.iter().take(ERRORS);
+        let fatal = errors.filter(|error| error.error_level.is("FATAL"));
+        let kind = |error: &ErrorView| cut(error.error_type.text().unwrap_or("?"));
+        let mut fatal: Vec<String> = fatal.map(kind).collect();
         fatal.dedup();
         let news = fatal.iter().filter(|kind| !self.fatal.contains(kind));
         all.extend(news.cloned().map(Alarm::Fatal));
         self.fatal = fatal;
-        let stop = state.pointer("/safetyState/eStop").and_then(Value::as_str);
-        let stop = stop.filter(|stop| *stop != "NONE").map(cut);
+        let stop = state.emergency_stop().filter(|stop| *stop != "NONE").map(cut);
         if let Some(kind) = stop.as_ref().filter(|_| self.stopped.is_none()) {
             all.push(Alarm::EmergencyStop(kind.clone()));
         }

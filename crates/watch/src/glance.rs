@@ -3,17 +3,16 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-use bytes::Bytes;
-use serde_json::Value;
-
 use super::Notice;
 use super::alarm::{Alarm, Alarmed, Alarms, cut};
+use bytes::Bytes;
 use tck_audit::result::FindingResult;
 use tck_audit::{Address, Found};
 use tck_base::clock::{Moment, Stamp};
-use tck_base::pattern::whole;
 use tck_base::verdict::Verdict;
-use tck_pack::Role;
+use tck_pack::{Packs, Role};
+use tck_view::{ActionView, ErrorView, Member, MessageView, StateView, Text, Topic};
+use tck_world::rest::open_actions;
 
 /// Upper ends of the buckets of reaction times, in seconds.
 pub const BUCKETS: [f64; 9] = [0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0];
@@ -169,43 +168,45 @@ impl Glance {
         }
     }
 
-    /// Takes in a message of its topic of this name; `stored` ones tell of the past. Gives what somebody has to be told.
-    pub fn take(&mut self, name: &str, at: Stamp, stored: bool, payload: &Bytes) -> Vec<Alarm> {
+    /// Takes in a message of its topic of this name; `stored` ones tell of the past. Gives what somebody has to be told. The
+    /// message is read as that of the version the vehicle has named.
+    pub fn take(&mut self, name: &str, at: Stamp, stored: bool, payload: &Bytes, packs: &Packs) -> Vec<Alarm> {
         *self.messages.entry(name.to_owned()).or_default() += 1;
         self.heard = Some(at);
         let mut alarms = Vec::new();
-        let Ok(message) = serde_json::from_slice::<Value>(payload) else {
+        let pack = self.version.as_deref().and_then(|version| packs.get(version));
+        let names = pack.unwrap_or_else(|| packs.latest()).names();
+        let topic = Topic::of_name(name);
+        let Ok(message) = MessageView::of_slice(topic, payload, names) else {
             return alarms;
         };
-        match name {
-            "order" if !stored => {
-                let id = message.get("orderId").and_then(Value::as_str);
-                let update = message.get("orderUpdateId").and_then(whole);
-                if let (Some(id), Some(update)) = (id, update) {
+        match &message {
+            MessageView::Order(order) if !stored => {
+                if let (Some(id), Some(update)) = (order.order_id.text(), order.order_update_id.whole()) {
                     let id = id.to_owned();
                     self.wait(at.moment, Command::Order { id, update });
                 }
             }
-            "instantActions" if !stored => {
-                let list = ["actions", "instantActions"].iter().find_map(|list| message.get(*list));
-                let ids = elements(list).filter_map(|action| text(action, "actionId"));
+            MessageView::InstantActions(actions) if !stored => {
+                let id = |action: &ActionView| action.action_id.text().map(str::to_owned);
+                let ids = actions.commanded().filter_map(id);
                 self.wait(at.moment, Command::Actions(ids.collect()));
             }
-            "connection" => {
-                self.connection = short(&message, "connectionState");
-                alarms.extend(self.alarms.connection(self.connection.as_deref(), at, stored));
+            MessageView::Connection(said) => {
+                self.connection = short(&said.connection_state);
+                alarms.extend(self.alarms.connection(said, at, stored));
             }
-            "state" => {
-                self.state(&message, payload);
+            MessageView::State(state) => {
+                self.state(state, payload);
                 if !stored {
-                    self.shown(&message, at.moment);
-                    alarms = self.alarms.state(&message, at);
+                    self.shown(state, at.moment);
+                    alarms = self.alarms.state(state, at);
                 }
             }
             _ => {}
         }
-        if !matches!(name, "order" | "instantActions") {
-            self.version = short(&message, "version").or(self.version.take());
+        if !topic.is_to_vehicle() {
+            self.version = short(&message.header().version).or(self.version.take());
         }
         alarms
     }
@@ -320,19 +321,18 @@ impl Glance {
     }
 
     /// What a state shows is answered.
-    fn shown(&mut self, state: &Value, now: Moment) {
+    fn shown(&mut self, state: &StateView, now: Moment) {
         if self.waiting.is_empty() {
             return;
         }
-        let order = state.get("orderId").and_then(Value::as_str);
-        let update = state.get("orderUpdateId").and_then(whole);
-        let ids: Vec<&str> = elements(state.get("actionStates"))
-            .filter_map(|action| action.get("actionId").and_then(Value::as_str))
-            .collect();
+        let update = state.order_update_id.whole();
+        let actions = state.all_action_states();
+        let ids: Vec<&str> = actions.filter_map(|action| action.action_id.text()).collect();
         for (since, command) in std::mem::take(&mut self.waiting) {
             let topic = match &command {
                 Command::Order { id, update: wanted } => {
-                    (order == Some(id.as_str()) && update.is_some_and(|update| update >= *wanted)).then_some("order")
+                    let is_shown = state.order_id.is(id) && update.is_some_and(|update| update >= *wanted);
+                    is_shown.then_some("order")
                 }
                 Command::Actions(wanted) => wanted
                     .iter()
@@ -346,39 +346,24 @@ impl Glance {
         }
     }
 
-    fn state(&mut self, state: &Value, payload: &Bytes) {
+    fn state(&mut self, state: &StateView, payload: &Bytes) {
         self.state = (payload.len() <= LARGEST).then(|| payload.clone());
-        self.mode = short(state, "operatingMode").or(self.mode.take());
-        let order = text(state, "orderId").filter(|id| !id.is_empty());
-        let update = state.get("orderUpdateId").and_then(whole);
-        self.order = order.map(|order| (cut(&order), update.unwrap_or_default()));
-        let (base, horizon): (Vec<_>, Vec<_>) = elements(state.get("nodeStates"))
-            .partition(|node| node.get("released").and_then(Value::as_bool).unwrap_or(true));
-        self.nodes = (base.len(), horizon.len());
-        self.last_node = short(state, "lastNodeId").filter(|id| !id.is_empty());
-        self.driving = state.get("driving").and_then(Value::as_bool).unwrap_or(false);
-        let is_open = |action: &&Value| {
-            let status = action.get("actionStatus").and_then(Value::as_str);
-            !matches!(status, Some("FINISHED" | "FAILED"))
-        };
-        self.actions = elements(state.get("actionStates")).filter(is_open).count();
-        self.charge = state.pointer("/batteryState/batteryCharge").and_then(Value::as_f64);
-        let named = |error: &Value| {
-            let text = |member: &str| short(error, member).unwrap_or_default();
-            (text("errorLevel"), text("errorType"))
-        };
-        self.errors = elements(state.get("errors")).take(16).map(named).collect();
+        self.mode = short(&state.operating_mode).or(self.mode.take());
+        let order = state.order_id.text().filter(|id| !id.is_empty());
+        let update = state.order_update_id.whole();
+        self.order = order.map(|order| (cut(order), update.unwrap_or_default()));
+        let base = state.node_states.iter().filter(|node| !node.released.is(false)).count();
+        self.nodes = (base, state.node_states.iter().len() - base);
+        self.last_node = short(&state.last_node_id).filter(|id| !id.is_empty());
+        self.driving = state.driving.is(true);
+        self.actions = open_actions(state).count();
+        let battery = state.battery_state.there();
+        self.charge = battery.and_then(|battery| battery.battery_charge.float());
+        let named = |error: &ErrorView| (cut(error.error_level.or_empty()), cut(error.error_type.or_empty()));
+        self.errors = state.errors.iter().take(16).map(named).collect();
     }
 }
 
-fn elements(list: Option<&Value>) -> impl Iterator<Item = &Value> {
-    list.and_then(Value::as_array).into_iter().flatten()
-}
-
-fn text(message: &Value, member: &str) -> Option<String> {
-    message.get(member)?.as_str().map(str::to_owned)
-}
-
-fn short(message: &Value, member: &str) -> Option<String> {
-    text(message, member).map(|text| cut(&text))
+fn short(member: &Member<Text>) -> Option<String> {
+    member.text().map(cut)
 }

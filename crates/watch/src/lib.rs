@@ -27,6 +27,7 @@ use tck_base::clock::{Moment, Stamp};
 use tck_base::verdict::Verdict;
 use tck_capture::{Message, Wire};
 use tck_judge::Rules;
+use tck_pack::Packs;
 
 pub use recorder::Rotation;
 
@@ -91,6 +92,7 @@ pub struct Watch<'r> {
     alarms: Vec<Alarmed>,
     /// Whether silence is a finding.
     judges_silence: bool,
+    packs: &'r Packs,
 }
 
 impl<'r> Watch<'r> {
@@ -108,6 +110,7 @@ impl<'r> Watch<'r> {
             glances: BTreeMap::new(),
             names: BTreeMap::new(),
             elsewhere: 0,
+            packs: &rules.packs,
         })
     }
 
@@ -126,7 +129,7 @@ impl<'r> Watch<'r> {
                         .entry(address.vehicle.clone())
                         .or_insert_with(|| Glance::new(&address));
                     let stored = message.retain == Some(true);
-                    let alarms = glance.take(&address.name, at, stored, &message.payload);
+                    let alarms = glance.take(&address.name, at, stored, &message.payload, self.packs);
                     self.alarms
                         .extend(alarms.into_iter().map(|alarm| glance.alarmed(at.utc, alarm)));
                 }

@@ -19,6 +19,7 @@ mod mock;
 mod observation;
 pub mod ordered;
 mod orders;
+pub mod rest;
 mod restarts;
 mod setting;
 mod shown;

@@ -17,21 +17,25 @@ use columns::{AROUND, FINDING, HEADER, Member, PAYLOAD};
 use parquet::{Cell, Kind, Table};
 use tck_capture::Message;
 use tck_journal::Parsed;
+use tck_pack::Packs;
+use tck_view::{Header, Names};
 
 /// See the module.
-pub struct Export {
+pub struct Export<'p> {
+    packs: &'p Packs,
     folder: PathBuf,
     tables: BTreeMap<String, Table<BufWriter<File>>>,
 }
 
-impl Export {
-    /// Tables in this folder.
+impl<'p> Export<'p> {
+    /// Tables in this folder; each message is read as one of the version it names.
     ///
     /// # Errors
     /// What the operating system says.
-    pub fn begin(folder: &Path) -> io::Result<Self> {
+    pub fn begin(folder: &Path, packs: &'p Packs) -> io::Result<Self> {
         std::fs::create_dir_all(folder)?;
         Ok(Self {
+            packs,
             folder: folder.to_owned(),
             tables: BTreeMap::new(),
         })
@@ -69,12 +73,22 @@ impl Export {
             message.retain.map_or(Cell::None, Cell::Bool),
         ];
         let inside = HEADER.iter().chain(members);
-        row.extend(inside.map(|member| cell(parsed.value(), member)));
+        let names = self.names(parsed.value());
+        row.extend(inside.map(|member| cell(parsed.value(), member, names)));
         row.push(std::str::from_utf8(&message.payload).map_or(Cell::None, text));
         match self.tables.get_mut(&of.name) {
             Some(table) => table.row(&row),
             None => Ok(()),
         }
+    }
+
+    /// What members of a message are called.
+    fn names(&self, message: Option<&Value>) -> &Names {
+        let latest = self.packs.latest();
+        let said = message.and_then(|message| latest.names().raw(message, &[Header::version])?.as_str());
+        said.and_then(|version| self.packs.get(version))
+            .unwrap_or(latest)
+            .names()
     }
 
     /// Adds what was found, and ends all tables.
@@ -127,8 +141,9 @@ fn about(finding: &FindingResult) -> [Cell; 11] {
 }
 
 /// A member as its column has it; nothing where the message has another type there.
-fn cell(message: Option<&Value>, member: &Member) -> Cell {
-    match (message.and_then(|message| message.pointer(member.pointer)), member.kind) {
+fn cell(message: Option<&Value>, member: &Member, names: &Names) -> Cell {
+    let value = message.and_then(|message| names.raw(message, member.path));
+    match (value, member.kind) {
         (Some(Value::Array(list)), Kind::Int) => whole(list.len()),
         (Some(value), Kind::Int) => value.as_i64().map_or(Cell::None, Cell::Int),
         (Some(value), Kind::Float) => value.as_f64().map_or(Cell::None, Cell::Float),
@@ -158,7 +173,7 @@ mod tests {
         let pack = library.rules.packs.latest();
         let messages = traffic(library, pack, Role::Agv, "order-acceptance/", &["horizon-not-reported"]);
         let folder = tempfile::tempdir().expect("folder");
-        let mut export = Export::begin(folder.path()).expect("begun");
+        let mut export = Export::begin(folder.path(), &library.rules.packs).expect("begun");
         let mut audit = Audit::new(&library.rules, Options::default()).expect("options");
         let mut states = 0;
         for message in messages {

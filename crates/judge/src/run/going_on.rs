@@ -43,12 +43,7 @@ impl RunJudge {
     /// The factsheet that the device had in the run that this one goes on with, or in one before that.
     pub fn factsheet_before(&self) -> Option<&Value> {
         let earlier = self.earlier.as_deref()?;
-        let own = earlier
-            .ground
-            .bindings
-            .get("device")
-            .and_then(|device| device.get("factsheet"));
-        own.or_else(|| earlier.factsheet_before())
+        earlier.ground.factsheet_json().or_else(|| earlier.factsheet_before())
     }
 
     /// The runs before this one.

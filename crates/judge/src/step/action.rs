@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use serde_json::Value;
-
 use super::{Holds, Position, Progress, StepOutcome, Timing, backlog, bound_clauses, ids, limit, seconds};
 use crate::limit::Limit;
 use crate::mend::{Mends, is_lasting, status_meant};
@@ -14,6 +12,7 @@ use tck_journal::Entry;
 use tck_journal::event::Waiver;
 use tck_result::NearestMiss;
 use tck_suite::model::{ActionWalk, Step, Walk};
+use tck_view::{MessageView, Names, StateView, Topic};
 
 /// The topic that reports action states.
 const TOPIC: &str = "state";
@@ -32,6 +31,8 @@ pub(crate) struct Walking {
     seen: u64,
     /// Actions that are known never to end, where nothing is decided.
     waivers: Vec<Waiver>,
+    /// What the version calls the members of messages.
+    names: Arc<Names>,
     /// What stands in the way of reading its status as it is.
     meant: Option<String>,
     /// It is one of them.
@@ -108,6 +109,7 @@ impl Walking {
             walked: Vec::new(),
             last: None,
             seen: 0,
+            names: Arc::clone(scene.pack.names()),
             waivers: Mends::of(scene.waivers, TOPIC, &ids(&verb.checks)).into_waivers(),
             meant: None,
             lasting: false,
@@ -129,9 +131,12 @@ impl Walking {
             return;
         }
         self.seen += 1;
-        let Some(status) = entry.json().and_then(|state| status_of(state, &self.id)) else {
+        let names = Arc::clone(&self.names);
+        let state = entry.view(Topic::State, &names).and_then(MessageView::state);
+        let Some(action) = state.and_then(|state| state.action(&self.id)) else {
             return;
         };
+        let status = action.action_status.text().unwrap_or("no status");
         if self.walked.last().is_some_and(|last| last == status) {
             return;
         }
@@ -139,8 +144,8 @@ impl Walking {
         shown.truncate(shown.char_indices().nth(40).map_or(shown.len(), |(at, _)| at));
         self.walked.push(shown);
         self.last = Some(Arc::clone(entry));
-        let action = entry.json().and_then(|state| action_of(state, &self.id));
-        self.lasting = self.verb.checks.is_empty() && action.is_some_and(|action| is_lasting(action, &self.waivers));
+        let is_lasting = |state| is_lasting(state, &self.id, &self.waivers, &names);
+        self.lasting = self.verb.checks.is_empty() && entry.json().is_some_and(is_lasting);
         let meant = status_meant(status, &self.waivers).map(|(meant, waiver)| (meant.to_owned(), waiver.why.clone()));
         let status = meant.as_ref().map_or(status, |(meant, _)| meant.as_str());
         self.through.step(status);
@@ -232,7 +237,7 @@ impl Walking {
             clause.expected = Some(self.verb.through.text.clone());
             clause.nearest = seq.filter(|_| stopped).map(|seq| NearestMiss {
                 seq,
-                path: "actionStates".to_owned(),
+                path: self.names.name(StateView::action_states).unwrap_or_default().to_owned(),
                 found: walked.clone(),
                 expected: self.verb.through.text.clone(),
             });
@@ -253,16 +258,6 @@ impl Walking {
             timing: None,
         }
     }
-}
-
-fn action_of<'a>(state: &'a Value, id: &str) -> Option<&'a Value> {
-    let mut all = state.get("actionStates")?.as_array()?.iter();
-    all.find(|one| one.get("actionId").and_then(Value::as_str) == Some(id))
-}
-
-fn status_of<'a>(state: &'a Value, id: &str) -> Option<&'a str> {
-    let one = action_of(state, id)?;
-    Some(one.get("actionStatus").and_then(Value::as_str).unwrap_or("no status"))
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use super::pretty::{self, Line};
 use crate::clean::line;
 use crate::headline::{headline, kind};
 use tck_journal::{Direction, Entry, Event, Journal, Payload};
+use tck_view::Names;
 
 /// Most messages of one page.
 const PAGE_LIMIT: usize = 600;
@@ -62,10 +63,6 @@ impl<'a> Gallery<'a> {
         self.journal
     }
 
-    pub fn entry(&self, seq: u64) -> Option<&'a Entry> {
-        self.journal?.get(seq).map(AsRef::as_ref)
-    }
-
     /// Whether the page shows this record.
     pub fn shows(&self, seq: u64) -> bool {
         self.shown.contains(&seq)
@@ -81,14 +78,14 @@ impl<'a> Gallery<'a> {
         if self.shown.contains(&seq) {
             return true;
         }
-        let Some(entry) = self
-            .entry(seq)
-            .filter(|_| self.shown.len() < PAGE_LIMIT && self.bytes < BYTES)
-        else {
+        let journal = self
+            .journal
+            .filter(|_| self.shown.len() < PAGE_LIMIT && self.bytes < BYTES);
+        let Some((journal, entry)) = journal.and_then(|journal| Some((journal, journal.get(seq)?))) else {
             return false;
         };
         self.shown.insert(seq);
-        let message = view(entry, role, places);
+        let message = view(entry, journal.names(), role, places);
         self.bytes += message
             .lines
             .iter()
@@ -106,7 +103,7 @@ impl<'a> Gallery<'a> {
     }
 }
 
-fn view(entry: &Entry, role: &str, places: &[&str]) -> MessageView {
+fn view(entry: &Entry, names: &Names, role: &str, places: &[&str]) -> MessageView {
     let mut cut = None;
     let lines = match entry.payload() {
         None => {
@@ -159,7 +156,7 @@ fn view(entry: &Entry, role: &str, places: &[&str]) -> MessageView {
     MessageView {
         seq: entry.seq(),
         kind: kind(entry),
-        headline: headline(entry, None),
+        headline: headline(entry, None, names),
         role: role.to_owned(),
         way: way(entry),
         topic: line(topic).into_owned(),

@@ -273,7 +273,7 @@ fn decision_view(
     gallery: &Gallery<'_>,
 ) -> DecisionView {
     let known = sources.requirement(&decision.requirement);
-    let see = |seq: u64| reference(gallery.entry(seq), seq);
+    let see = |seq: u64| reference(gallery.journal(), seq);
     DecisionView {
         badge: Badge::of(Some(decision.verdict())),
         full: decision.is_finding(),

@@ -1,10 +1,6 @@
 //! What each record of a journal window looks like as a row of the diagram. Leaving rows out is left to
 //! [`super::thin`].
 
-use std::collections::HashMap;
-
-use serde_json::Value;
-
 use super::Options;
 use super::row::{Lane, Row, What};
 use super::thin::{flagged, repeats, shorten, twins};
@@ -12,6 +8,7 @@ use crate::clean::{line, short};
 use crate::headline::{self, headline};
 use tck_journal::event::{Close, LinkFault, Program, StepEnd};
 use tck_journal::{Direction, Entry, Event, Journal, Packet};
+use tck_view::{MessageView, Names, StateView};
 
 /// The rows of a window, and what was not drawn.
 pub struct Found {
@@ -36,7 +33,8 @@ pub fn collect(journal: &Journal, (first, last): (u64, u64), options: &Options<'
         acknowledgements: 0,
         probes: 0,
     };
-    let mut before: HashMap<String, &Value> = HashMap::new();
+    let names = journal.names();
+    let mut before: Option<&StateView> = None;
     for (at, entry) in entries.iter().enumerate() {
         match entry.event() {
             Event::ProbeSent { .. } | Event::ProbeReceived { .. } => found.probes += 1,
@@ -49,14 +47,13 @@ pub fn collect(journal: &Journal, (first, last): (u64, u64), options: &Options<'
         if twins.hidden.contains(&at) || flagged(&mut found.drawn, entry) {
             continue;
         }
-        let topic = headline::topic(entry);
-        let previous = topic.as_ref().and_then(|topic| before.get(topic)).copied();
-        let Some(mut row) = row(entry, twins.seen.contains(&at), tap, previous, options) else {
+        let around = (before, names);
+        let Some(mut row) = row(entry, twins.seen.contains(&at), tap, around, options) else {
             continue;
         };
         row.time = start.map(|start| (entry.at().moment - start).as_secs_f64());
-        if let (Some(topic), Some(json)) = (topic, entry.json()) {
-            before.insert(topic, json);
+        if let Some(MessageView::State(state)) = headline::view(entry, names) {
+            before = Some(state);
         }
         if !repeats(&mut found.drawn, &row, options) {
             found.drawn.push(row);
@@ -92,11 +89,17 @@ fn arrow(from: Lane, to: Lane) -> What {
     What::Arrow { from, to, unseen: None }
 }
 
-fn row(entry: &Entry, twin: bool, tap: bool, before: Option<&Value>, options: &Options<'_>) -> Option<Row> {
+fn row(
+    entry: &Entry,
+    twin: bool,
+    tap: bool,
+    (before, names): (Option<&StateView>, &Names),
+    options: &Options<'_>,
+) -> Option<Row> {
     use Lane::{Broker, Device, Harness};
     let text = |text: &str| line(text).into_owned();
     let message = |what| {
-        let words = headline(entry, before);
+        let words = headline(entry, before, names);
         let mut row = plain(entry, what, headline::kind(entry), words.clone());
         row.headline = words;
         row.topic = headline::topic(entry);

@@ -1,0 +1,76 @@
+//! The factsheet of the device, as a run knows it.
+
+use std::ops::Deref;
+use std::sync::Arc;
+
+use serde_json::Value;
+use tck_view::{FactsheetView, MessageView, Names, Topic};
+
+/// A factsheet. Its limits are kept as they were published, too: tests name any of them.
+#[derive(Clone, Debug, Default)]
+pub struct Sheet {
+    view: Arc<FactsheetView>,
+    limits: Option<Value>,
+}
+
+impl Sheet {
+    /// Reads a factsheet message.
+    #[must_use]
+    pub fn read(message: &Value, names: &Names) -> Self {
+        let view = MessageView::of_value(Topic::Factsheet, message, names);
+        Self {
+            view: view.factsheet().map(Arc::clone).unwrap_or_default(),
+            limits: names.raw(message, &[FactsheetView::protocol_limits]).cloned(),
+        }
+    }
+
+    /// Whether a limit is set, such as `maxArrayLens.order.nodes`: a group, and a member whose name has dots in it. `None`
+    /// when there are no limits at all.
+    #[must_use]
+    pub fn has_limit(&self, path: &str) -> Option<bool> {
+        let (group, member) = path.split_once('.').unwrap_or((path, ""));
+        let value = self.limits.as_ref()?.get(group).and_then(|group| group.get(member));
+        Some(value.and_then(Value::as_f64).is_some_and(|limit| limit > 0.0))
+    }
+
+    /// Whether it lists an action; `None` when it has no such list.
+    #[must_use]
+    pub fn has_action(&self, name: &str, scope: Option<&str>) -> Option<bool> {
+        let all = self.protocol_features.there()?.actions.there()?;
+        Some(all.iter().any(|action| {
+            let is_scope = |scope: &str| action.action_scopes.texts().any(|other| other == scope);
+            action.action_type.is(name) && scope.is_none_or(is_scope)
+        }))
+    }
+
+    /// Whether it lists an optional parameter; `None` when it has no such list.
+    #[must_use]
+    pub fn has_optional(&self, path: &str) -> Option<bool> {
+        let all = self.protocol_features.there()?.optional_parameters.there()?;
+        Some(all.iter().any(|one| one.parameter.is(path)))
+    }
+
+    /// Whether the vehicle cannot do without the optional parameter, or without a part of it.
+    #[must_use]
+    pub fn requires(&self, path: &str) -> bool {
+        self.optional_parameters().any(|one| {
+            let rest = one.parameter.or_empty().strip_prefix(path);
+            let is_part = rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+            is_part && one.support.is("REQUIRED")
+        })
+    }
+
+    /// The series it is of.
+    #[must_use]
+    pub fn series(&self) -> Option<&str> {
+        self.type_specification.there()?.series_name.text()
+    }
+}
+
+impl Deref for Sheet {
+    type Target = FactsheetView;
+
+    fn deref(&self) -> &FactsheetView {
+        &self.view
+    }
+}
