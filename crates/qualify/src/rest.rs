@@ -3,7 +3,7 @@
 //! What the suites say no fault is known to fail is left out: to try everything on it would cost minutes and show what
 //! is known.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::DRAWN;
 use super::decider::Decider;
@@ -67,22 +67,34 @@ impl<'r> Rest<'r> {
         self.grounds.kill(fault, draw, selected)
     }
 
-    /// Tries the faults on the tests that decide what they break, where something in them is open.
+    /// Tries the faults on the tests that decide what they break: first where that is what is open, then where something
+    /// else is.
     fn try_the_concerned(&self, faults: &[Fault], kills: &mut [Kill]) -> Result<(), EngineError> {
-        for some in faults.chunks(CHUNK) {
-            let places = self.open_places(kills);
-            let is_open = |test: &Test| places.contains(test.table());
-            let more = each(some, |fault| {
-                self.kill(fault, DRAWN, &|test| is_open(test) && concerns(fault, test))
-            })?;
-            merge(kills, more);
+        for own in [true, false] {
+            self.try_where(faults, kills, DRAWN, own)?;
         }
         // What only some members show is tried on all that is drawn from.
+        for own in [true, false] {
+            self.try_where(faults, kills, None, own)?;
+        }
+        Ok(())
+    }
+
+    /// Tries each fault on the tests that decide what it breaks, in which that (`own`), or only something else, is open.
+    /// With all that is drawn from, on the tests that draw.
+    fn try_where(&self, faults: &[Fault], kills: &mut [Kill], draw: Option<u64>, own: bool) -> Result<(), EngineError> {
         for some in faults.chunks(CHUNK) {
-            let places = self.open_places(kills);
-            let is_open = |test: &Test| test.drawn.is_some() && places.contains(test.table());
+            let mut open: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+            for decider in self.open(kills) {
+                let place = decider.place.split(' ').next().unwrap_or_default();
+                open.entry(place).or_default().insert(&decider.requirement);
+            }
             let more = each(some, |fault| {
-                self.kill(fault, None, &|test| is_open(test) && concerns(fault, test))
+                self.kill(fault, draw, &|test| {
+                    let open = open.get(test.table());
+                    let is_meant = open.is_some_and(|open| fault.breaks.iter().any(|id| open.contains(id)) == own);
+                    is_meant && (draw.is_some() || test.drawn.is_some()) && concerns(fault, test)
+                })
             })?;
             merge(kills, more);
         }
