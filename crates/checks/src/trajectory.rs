@@ -256,7 +256,6 @@ impl Running for Planned {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::trace::Trace;
     use serde_json::{Value, json};
 
