@@ -207,8 +207,9 @@ impl Continuity {
     pub fn learn(&mut self, message: Option<&MessageView>) {
         match message {
             Some(MessageView::Order(order)) => {
-                let order_and_update = order.order_id.text().zip(order.order_update_id.whole());
-                order_and_update.into_iter().for_each(|both| self.sent.add(both));
+                if let (Some(id), Some(update)) = (order.order_id.text(), order.order_update_id.whole()) {
+                    self.sent.add((id, update));
+                }
                 self.actions(order.actions().map(|(_, action)| action));
             }
             Some(MessageView::InstantActions(message)) => self.actions(message.all_actions()),

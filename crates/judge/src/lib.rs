@@ -35,12 +35,13 @@ mod watches;
 mod window;
 
 pub use gone::{Gone, Sign};
+pub use grounds::Ground;
 pub use library::Library;
 pub use monitor::MonitorJudge;
 pub use rules::{JudgeError, Rules};
 pub use run::{RESULT_FORMAT, RunJudge, judge, judged};
 pub use side::SideJudge;
 pub use step::Progress;
-pub use test::{Ground, TestJudge};
+pub use test::TestJudge;
 pub use timeline::{Timeline, client_of, number_of};
 pub use watches::Observed;

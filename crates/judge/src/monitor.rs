@@ -8,10 +8,10 @@ use std::sync::Arc;
 use serde_json::Map;
 
 use super::decide::mood;
+use super::grounds::Ground;
 use super::hidden::Hidden;
 use super::holds::unbound_text;
 use super::step::shown_path;
-use super::test::Ground;
 use tck_base::pattern::{Bindings, Bound, Unbound};
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_check::{CheckContext, CheckFinding, Running, Shared, find};

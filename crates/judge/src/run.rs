@@ -17,13 +17,13 @@ pub use conclusion::RESULT_FORMAT;
 pub use going_on::{judge, judged};
 
 use super::company::{Company, Part};
-use super::grounds::Grounds;
+use super::grounds::{Ground, Grounds};
 use super::hidden::Hidden;
 use super::mend::mended;
 use super::program;
 use super::reactions::Reactions;
 use super::rules::{JudgeError, Rules};
-use super::test::{Ground, TestJudge};
+use super::test::TestJudge;
 use super::timeline::Timeline;
 use super::unheard::Unheard;
 use super::watches::Watches;

@@ -6,10 +6,9 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::company::{Company, Part};
-use super::grounds::Grounds;
+use super::grounds::{Ground, Grounds};
 use super::rules::{JudgeError, Rules};
 use super::run::interrupted;
-use super::test::Ground;
 use super::timeline::Timeline;
 use super::watches::{Observed, Watches};
 use tck_journal::Entry;

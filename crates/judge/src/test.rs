@@ -4,14 +4,14 @@
 //! variables, lets an evaluator decide each step, and turns the clauses into decisions. The engine asks it
 //! what to wait for; nothing the engine does can change a decision except by what ends up in the journal.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use serde_json::{Map, Value};
+use serde_json::Value;
 
 use super::decide::decide;
 use super::departure::Departure;
 use super::gone::Gone;
+use super::grounds::Ground;
 use super::hidden::{Hidden, Open, hide};
 use super::own_errors::{is_refused, reported};
 use super::scene::Scene;
@@ -19,69 +19,12 @@ use super::step::{Evaluator, Holds, Position, Progress, StepOutcome, Timing};
 use super::timeline::Timeline;
 use tck_base::clock::Moment;
 use tck_base::pattern::Bindings;
-use tck_base::time::TimeLimits;
 use tck_base::verdict::{Accumulated, Verdict};
-use tck_check::Check;
-use tck_journal::event::{Event, StepEnd, Waiver};
+use tck_journal::event::{Event, StepEnd};
 use tck_journal::{Entry, Reason};
-use tck_pack::{Catalogue, Pack, Role};
+use tck_pack::Role;
 use tck_result::{Decision, StepResult, TestResult, Waited};
 use tck_suite::model::{Section, Step, Test, Verb};
-use tck_view::{FactsheetView, MessageView, Topic};
-use tck_world::Setting;
-
-/// What does not change during a run.
-pub struct Ground {
-    /// The named checks.
-    pub checks: &'static [Check],
-    /// The protocol version.
-    pub pack: Arc<Pack>,
-    /// The requirements.
-    pub catalogue: Arc<Catalogue>,
-    /// Full topic by topic name.
-    pub topics: BTreeMap<String, String>,
-    /// The side under test.
-    pub role: Role,
-    /// Manufacturer and serial number; of the vehicle that is commanded, when a master control is tested.
-    pub identity: (String, String),
-    /// `time`, `device`.
-    pub bindings: Arc<Map<String, Value>>,
-    /// The limits among them.
-    pub time: TimeLimits,
-    /// Lasting mistakes of the vehicle that do not stand in the way any more.
-    pub waivers: Vec<Waiver>,
-    /// Why what is found at present may stem from somebody else: one on the tap, or who has interrupted the run.
-    pub interference: Option<Arc<str>>,
-    /// Whether the run was interrupted. Then nothing is held against the device any more, not even as a remark.
-    pub is_interrupted: bool,
-}
-
-impl Ground {
-    /// The factsheet of the device, where the run knows it, as it was published.
-    #[must_use]
-    pub fn factsheet_json(&self) -> Option<&Value> {
-        self.bindings.get("device")?.get("factsheet")
-    }
-
-    /// The factsheet of the device, where the run knows it.
-    #[must_use]
-    pub fn factsheet(&self) -> Option<Arc<FactsheetView>> {
-        let message = MessageView::of_value(Topic::Factsheet, self.factsheet_json()?, self.pack.names());
-        message.factsheet().map(Arc::clone)
-    }
-
-    /// What monitors and facts may know besides the records.
-    pub(super) fn setting(&self) -> Setting<'_> {
-        Setting {
-            pack: &self.pack,
-            topics: &self.topics,
-            role: self.role,
-            identity: (&self.identity.0, &self.identity.1),
-            bindings: &self.bindings,
-            time: &self.time,
-        }
-    }
-}
 
 /// What is only preferred by a ruling of the catalogue: broken is a warning.
 fn of_preference(holds: Holds) -> Holds {

@@ -8,9 +8,9 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::Arc;
 
+use super::grounds::Ground;
 use super::hidden::Hidden;
 use super::monitor::{FIRST, Knowledge, MonitorJudge};
-use super::test::Ground;
 use super::timeline::Timeline;
 use tck_base::clock::Moment;
 use tck_base::pattern::Bindings;

@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use super::rest::Obstacle;
 use tck_base::clock::Moment;
@@ -61,7 +61,7 @@ fn object<const N: usize>(names: &Names, members: [(Field, Value); N]) -> Value 
     let named = members
         .into_iter()
         .map(|(member, value)| (called(names, member), value));
-    Value::Object(Map::from_iter(named))
+    Value::Object(named.collect())
 }
 
 /// Members that break the schema in a vehicle of which nothing was asked: what they mean is clear.
