@@ -40,6 +40,7 @@ impl Grounds {
             identity: (manufacturer.to_owned(), serial_number.to_owned()),
             bindings: Arc::clone(&bindings),
             time: TimeLimits::of_bindings(&bindings),
+            hooks: Arc::clone(&rules.hooks),
             waivers: Vec::new(),
             interference: None,
             is_interrupted: false,

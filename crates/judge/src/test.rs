@@ -24,7 +24,7 @@ use tck_base::verdict::{Accumulated, Verdict};
 use tck_check::Check;
 use tck_journal::event::{Event, StepEnd, Waiver};
 use tck_journal::{Entry, Reason};
-use tck_pack::{Catalogue, Pack, Role};
+use tck_pack::{Catalogue, Hooks, Pack, Role};
 use tck_result::{Decision, StepResult, TestResult, Waited};
 use tck_suite::model::{Section, Step, Test, Verb};
 use tck_world::Setting;
@@ -47,6 +47,8 @@ pub struct Ground {
     pub bindings: Arc<Map<String, Value>>,
     /// The limits among them.
     pub time: TimeLimits,
+    /// What can be done to the device, and what follows from it.
+    pub hooks: Arc<Hooks>,
     /// Lasting mistakes of the vehicle that do not stand in the way any more.
     pub waivers: Vec<Waiver>,
     /// Why what is found at present may stem from somebody else: one on the tap, or who has interrupted the run.
@@ -65,6 +67,7 @@ impl Ground {
             identity: (&self.identity.0, &self.identity.1),
             bindings: &self.bindings,
             time: &self.time,
+            hooks: &self.hooks,
         }
     }
 }
@@ -257,6 +260,7 @@ impl TestJudge {
             identity: (&ground.identity.0, &ground.identity.1),
             run_bindings: &ground.bindings,
             time: &ground.time,
+            hooks: &ground.hooks,
             bindings: &self.bindings,
             timeline,
             entries: &self.entries,
