@@ -308,8 +308,7 @@ impl Hooks {
         if problems.is_empty() { Ok(hooks) } else { Err(problems) }
     }
 
-    /// Checks the text of one file of hooks; how many it has. A hook that another file has, by the same path or not, is its
-    /// opposite as well.
+    /// Checks the text of one file of hooks; how many it has. `undoes` may name a hook of these, too.
     ///
     /// # Errors
     /// Every mistake in it.
@@ -320,9 +319,9 @@ impl Hooks {
             let here = entries.iter().any(|entry| entry.is(role, name));
             here || self.find(name, role).is_some()
         };
-        problems.extend(entries.iter().filter_map(|entry| entry.without_opposite(known)));
         let mut taken = BTreeMap::new();
         problems.extend(entries.iter().filter_map(|entry| entry.taken_by(&mut taken)));
+        problems.extend(entries.iter().filter_map(|entry| entry.without_opposite(known)));
         if problems.is_empty() {
             Ok(entries.len())
         } else {
