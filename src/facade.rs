@@ -164,7 +164,7 @@ impl Tck {
             }
             Device::Profile(path) => {
                 let surroundings = Surroundings::of_process();
-                let effective = profile::load(Some(&path), &[], &surroundings)?;
+                let effective = profile::load(Some(&path), &[], &surroundings, &library.rules.hooks)?;
                 let pack = pack_of(&library, &effective).map_err(|wrong| vec![wrong])?;
                 let place = Place {
                     folder: path.parent().map_or_else(PathBuf::new, Path::to_path_buf),

@@ -625,3 +625,37 @@ fn refuse(modules: &[&str], words: &[&str], places: &[&str]) {
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
+
+/// Who knows hooks by name: the devices that do what they ask for, and the words of mock vehicles, some of which sound alike.
+const DOES_HOOKS: [&str; 3] = ["reference/", "simulate/", "profile/vehicle.rs"];
+
+/// Words of other lists that a hook has, too.
+const NAMED_ALIKE: [(&str, &str); 1] = [("watch/alarm.rs", "emergency-stop")];
+
+/// What a hook does stands in its file. A name in the code would be right for the built-in hook alone, and one that no hook has
+/// would never be found.
+#[test]
+fn no_code_but_the_devices_knows_a_hook_by_its_name() {
+    let assets = vda5050_tck::embedded();
+    let hooks = vda5050_tck::pack::Hooks::load(&assets).expect("hooks");
+    let names: BTreeSet<&str> = hooks.all().map(|hook| hook.name.as_str()).collect();
+    let mut wrong = Vec::new();
+    for (path, text) in sources() {
+        let place = in_room(&path);
+        if is_test_file(&path) || DOES_HOOKS.iter().any(|device| place.starts_with(device)) {
+            continue;
+        }
+        for (at, line) in code(&text) {
+            let quoted = line.split('"').skip(1).step_by(2);
+            // A word of one part may be another one's: `start`, `cancel`, `pause`.
+            let named = |word: &str| names.contains(word) && (word.contains('-') || line.contains("hook"));
+            let named = quoted.filter(|word| named(word) && !NAMED_ALIKE.contains(&(place.as_str(), *word)));
+            wrong.extend(named.map(|word| format!("{place}:{at}: {word}")));
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "ask for an effect, `HookEffect` of tck-pack:\n{}",
+        wrong.join("\n")
+    );
+}

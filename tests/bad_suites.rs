@@ -11,20 +11,14 @@ use std::fmt::Write;
 use std::path::Path;
 
 use vda5050_tck::diagnostic::Diagnostic;
-use vda5050_tck::pack::{Catalogue, Packs, Role};
-use vda5050_tck::suite::{CheckInfo, HookFacts, PackVocabulary, Suites};
+use vda5050_tck::pack::{Catalogue, Hooks, Packs};
+use vda5050_tck::suite::{CheckInfo, PackVocabulary, Suites};
 
 const CHECKS: [CheckInfo; 1] = [CheckInfo {
     name: "header/id-rises",
     decides: &["HDR-02"],
     arguments: &["topic"],
     needs: &[],
-}];
-
-const HOOKS: [HookFacts; 1] = [HookFacts {
-    name: "power-cycle",
-    role: Role::Agv,
-    parameters: &[],
 }];
 
 fn good_state(name: &str) -> (String, String) {
@@ -66,7 +60,8 @@ fn every_bad_suite_yields_the_one_diagnostic_it_expects() {
     let assets = vda5050_tck::embedded();
     let packs = Packs::load(&assets).expect("packs");
     let catalogue = Catalogue::load(&assets).expect("catalogue");
-    let vocabulary = PackVocabulary::new(&packs, &catalogue, &HOOKS);
+    let hooks = Hooks::load(&assets).expect("hooks");
+    let vocabulary = PackVocabulary::new(&packs, &catalogue, &hooks);
     let mut count = 0;
     let mut others = String::new();
     insta::glob!("../fixtures/bad-suites", "*.yaml", |path| {

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 use vda5050_tck::diagnostic::Source;
+use vda5050_tck::pack::{HookChange, HookEffect, HookRisk};
 use vda5050_tck::yaml;
 
 fn root() -> &'static Path {
@@ -27,7 +28,12 @@ fn suites_below(folder: &Path, found: &mut Vec<PathBuf>) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     for entry in entries {
         let path = entry.expect("entry").path();
-        let of_another_form = ["suites/requirements", "suites/qualification", "suites/explore"];
+        let of_another_form = [
+            "suites/requirements",
+            "suites/qualification",
+            "suites/explore",
+            "suites/hooks",
+        ];
         if path.is_dir() && !of_another_form.iter().any(|folder| path.ends_with(folder)) {
             suites_below(&path, found);
         } else if path.extension().is_some_and(|extension| extension == "yaml") {
@@ -49,14 +55,14 @@ fn files_below(folder: &Path, found: &mut Vec<PathBuf>) {
 }
 
 #[test]
-fn requirements_and_stimuli_have_schemas_of_their_own() {
-    for (what, folder) in [("requirements", "requirements"), ("explore", "explore")] {
+fn requirements_stimuli_and_hooks_have_schemas_of_their_own() {
+    for (what, least) in [("requirements", 20), ("explore", 20), ("hooks", 2)] {
         let schema = schema_of(what);
         let mut files = Vec::new();
         for suites in ["suites", "fixtures/own"] {
-            files_below(&root().join(suites).join(folder), &mut files);
+            files_below(&root().join(suites).join(what), &mut files);
         }
-        assert!(files.len() > 20, "{what}");
+        assert!(files.len() > least, "{what}");
         for path in files {
             let value = read(&path).unwrap_or_else(|| panic!("{} is no YAML", path.display()));
             let objections: Vec<String> = schema.iter_errors(&value).map(|error| error.to_string()).collect();
@@ -80,6 +86,39 @@ fn requirements_and_stimuli_have_schemas_of_their_own() {
     let mut broken = stimuli.clone();
     broken["blink"]["sedns"] = "".into();
     assert!(!schema_of("explore").is_valid(&broken));
+    let hooks = read(&root().join("fixtures/own/hooks/sys.yaml")).expect("YAML");
+    let schema = schema_of("hooks");
+    for (member, wrong) in [
+        ("hook", serde_json::json!("Turn key")),
+        ("effects", serde_json::json!(["turns"])),
+        ("changes", serde_json::json!("pause")),
+        ("risk", serde_json::json!("high")),
+        (
+            "parameters",
+            serde_json::json!({ "to": { "about": "where it points to" } }),
+        ),
+        ("undo", serde_json::json!("x")),
+    ] {
+        let mut broken = hooks.clone();
+        broken["hooks"][0][member] = wrong;
+        assert!(!schema.is_valid(&broken), "{member}");
+    }
+}
+
+#[test]
+fn the_schema_of_hooks_knows_the_words_of_the_program() {
+    let text = std::fs::read_to_string(root().join("schemas/hooks.schema.json")).expect("schema");
+    let schema: Value = serde_json::from_str(&text).expect("JSON");
+    let properties = &schema["$defs"]["hook"]["properties"];
+    assert_eq!(
+        properties["effects"]["items"]["enum"],
+        serde_json::json!(HookEffect::ALL)
+    );
+    assert_eq!(
+        properties["changes"]["items"]["enum"],
+        serde_json::json!(HookChange::ALL)
+    );
+    assert_eq!(properties["risk"]["enum"], serde_json::json!(HookRisk::ALL));
 }
 
 fn read(path: &Path) -> Option<Value> {

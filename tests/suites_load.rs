@@ -7,40 +7,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use vda5050_tck::checks;
-use vda5050_tck::pack::{Assets, Catalogue, Packs, Role};
-use vda5050_tck::suite::{CheckInfo, HookFacts, Suites};
-
-/// The hooks these suites use, with their parameters.
-const HOOKS: &[(&str, &[&str])] = &[
-    ("move-to", &["nodeId"]),
-    ("place-obstacle", &["edgeId"]),
-    ("push-out", &[]),
-    ("shift-position", &[]),
-    ("remove-obstacle", &["edgeId"]),
-    ("power-cycle", &[]),
-    ("shutdown", &[]),
-    ("start", &[]),
-    ("set-mode", &["mode"]),
-    ("drive-manually", &[]),
-    ("move-to", &["nodeId"]),
-    ("provoke-error", &["errorLevel"]),
-    ("clear-error", &[]),
-    ("emergency-stop", &[]),
-    ("release-emergency-stop", &[]),
-    ("enter-field", &[]),
-    ("leave-field", &[]),
-    ("trigger", &["actionId"]),
-    ("press-pause", &[]),
-    ("release-pause", &[]),
-    ("block-pause", &[]),
-    ("unblock-pause", &[]),
-    ("lock-charger", &[]),
-    ("unlock-charger", &[]),
-    ("use-lift", &["mapId"]),
-    ("enable-map", &["mapId", "mapVersion"]),
-    ("place-load", &["loadType"]),
-    ("remove-load", &["loadType"]),
-];
+use vda5050_tck::pack::{Assets, Catalogue, Hooks, Packs, Role};
+use vda5050_tck::suite::{CheckInfo, Suites};
 
 fn load() -> (Suites, Catalogue) {
     // Files of a folder are linted; those the program carries were, by this test.
@@ -56,25 +24,7 @@ fn load() -> (Suites, Catalogue) {
             needs: check.needs,
         })
         .collect();
-    let hooks: Vec<HookFacts> = HOOKS
-        .iter()
-        .map(|(name, parameters)| HookFacts {
-            name,
-            role: Role::Agv,
-            parameters,
-        })
-        // Any hook may be used to make a master control act.
-        .chain(
-            vda5050_tck::profile::HOOKS
-                .iter()
-                .filter(|hook| hook.role == Role::MasterControl)
-                .map(|hook| HookFacts {
-                    name: hook.name,
-                    role: hook.role,
-                    parameters: hook.parameters,
-                }),
-        )
-        .collect();
+    let hooks = Hooks::load(&assets).expect("hooks");
     let suites = Suites::load(&assets, &packs, &catalogue, &known, &hooks).unwrap_or_else(|diagnostics| {
         for diagnostic in &diagnostics {
             println!("{}", diagnostic.render(false));

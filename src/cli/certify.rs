@@ -5,7 +5,7 @@ use super::exit::Exit;
 use super::outputs::Outputs;
 use super::problem::Problem;
 use tck_base::diagnostic::Diagnostic;
-use tck_pack::Role;
+use tck_pack::{Hooks, Role};
 use tck_profile::{self as profile, Effective, Surroundings};
 use tck_report::certificate::OWED;
 
@@ -16,7 +16,8 @@ const OWN_SUITES: &str = "VDA5050_TCK_SUITES";
 pub fn certify(arguments: &args::Certify, outputs: &Outputs<'_>) -> Result<Exit, Problem> {
     let surroundings = Surroundings::of_process();
     let said = arguments.certificate.settings();
-    let effective = profile::load(arguments.profile.as_deref(), &said, &surroundings)?;
+    let hooks = Hooks::load(&crate::embedded())?;
+    let effective = profile::load(arguments.profile.as_deref(), &said, &surroundings, &hooks)?;
     let missing = missing(&effective, &surroundings);
     if !missing.is_empty() {
         return Err(Problem::Usage(missing));

@@ -78,7 +78,7 @@ pub fn init(arguments: &Init) -> Result<Exit, Problem> {
         lif: arguments.lif.clone(),
         vehicle_type: arguments.vehicle_type.clone(),
     };
-    let text = draft(device, &wishes, &library.rules.packs);
+    let text = draft(device, &wishes, &library.rules.packs, &library.rules.hooks);
     let shown = arguments.file.display().to_string();
     std::fs::write(&arguments.file, text)
         .map_err(|error| Problem::Environment(format!("cannot write {shown}: {error}")))?;

@@ -1,11 +1,13 @@
 //! `explain --format json`: the same for programs, an object for each thing of that name.
 
+use std::collections::BTreeSet;
+
 use serde_json::{Map, Value, json};
 
 use tck_checks as checks;
 use tck_judge::Library;
-use tck_pack::{Pack, Requirement, Role};
-use tck_profile::{HOOKS, SAMPLE_ACTIONS, STATEMENTS};
+use tck_pack::{HookInfo, Pack, Requirement, Role};
+use tck_profile::{HookExample, SAMPLE_ACTIONS, STATEMENTS};
 use tck_reference::Fault;
 use tck_simulate::BuiltIn;
 use tck_suite::model::{Monitor, Rule, Test};
@@ -28,12 +30,7 @@ pub(super) fn all(id: &str, library: &Library, pack: &Pack) -> Vec<Value> {
     if let Some(check) = tck_check::find(checks::REGISTRY, id) {
         found.push(json!({ "kind": "check", "id": id, "doc": check.doc, "decides": check.decides }));
     }
-    for hook in HOOKS.iter().filter(|hook| hook.name == id) {
-        found.push(
-            json!({ "kind": "hook", "id": id, "role": hook.role.word(), "doc": hook.doc,
-            "parameters": hook.parameters }),
-        );
-    }
+    found.extend(library.rules.hooks.named(id).map(|known| hook(known, library)));
     if let Some(doc) = setting(id) {
         found.push(json!({ "kind": "setting", "id": id, "doc": doc }));
     }
@@ -83,6 +80,30 @@ fn requirement(known: &Requirement, library: &Library, pack: &Pack) -> Value {
     json!({ "kind": "requirement", "id": id, "chapter": known.chapter, "text": known.text, "role": known.role.word(),
         "versions": versions, "inVersion": known.in_version(pack).is_some(), "interpretation": known.interpretation,
         "decided": known.decided.word(), "tests": by, "monitors": monitors, "provedWith": proved })
+}
+
+/// The tests that ask for a hook, each table once.
+pub(super) fn using<'a>(hook: &HookInfo, library: &'a Library) -> BTreeSet<&'a str> {
+    let tests = library.rules.suites.tests.iter();
+    let using = tests.filter(|test| test.device == hook.role && test.hooks().contains(hook.name.as_str()));
+    using.map(|test| test.table()).collect()
+}
+
+fn hook(known: &HookInfo, library: &Library) -> Value {
+    let parameters = known.parameters.iter().map(|parameter| {
+        let values = parameter.values.iter();
+        let values: Vec<Value> = values
+            .map(|value| json!({ "id": value.id, "text": value.text }))
+            .collect();
+        json!({ "name": parameter.name, "about": parameter.about, "example": parameter.example, "values": values })
+    });
+    let example = HookExample::of(known);
+    let opposite = library.rules.hooks.opposite(known).map(|hook| &hook.name);
+    json!({ "kind": "hook", "id": known.name, "role": known.role.word(), "doc": known.doc,
+        "parameters": parameters.collect::<Vec<Value>>(), "effects": known.effects, "changes": known.changes(),
+        "risk": known.risk, "undoes": known.undoes, "undoneBy": opposite, "forAction": known.for_action,
+        "optional": known.optional, "tests": using(known, library),
+        "profile": [example.prompt, example.run, example.http], "request": example.request })
 }
 
 fn test(known: &Test, cases: usize) -> Value {

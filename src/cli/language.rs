@@ -7,8 +7,9 @@ use serde_json::{Value, json};
 
 use tck_checks as checks;
 use tck_judge::Library;
+use tck_pack::HookEffect;
 use tck_pack::Pack;
-use tck_profile::{HOOKS, VEHICLE_WORDS};
+use tck_profile::VEHICLE_WORDS;
 use tck_suite::{harness_topics, variables};
 
 /// Parts of the schema that are no part of the language: they stand for it, or are filled in.
@@ -166,20 +167,34 @@ fn sections(library: &Library) -> Result<Vec<Section>, String> {
             })
             .collect(),
     });
+    let hooks = &library.rules.hooks;
     all.push(Section {
         part: "Hooks",
         name: String::new(),
         doc: "What `operator:` can ask of a person or a machine.".to_owned(),
         columns: ["Hook", "Parameters", "What is done"],
-        rows: HOOKS
-            .iter()
+        rows: hooks
+            .all()
             .map(|hook| {
-                plain(
-                    hook.name,
-                    &hook.parameters.join(", "),
-                    &format!("{} ({})", hook.doc, hook.role),
-                )
+                let parameters: Vec<&str> = hook
+                    .parameters
+                    .iter()
+                    .map(|parameter| parameter.name.as_str())
+                    .collect();
+                let doc = format!("{} ({})", hook.doc, hook.role);
+                plain(&hook.name, &parameters.join(", "), &doc)
             })
+            .collect(),
+    });
+    all.push(Section {
+        part: "Hooks",
+        name: "Effects".to_owned(),
+        doc: "What a file below `hooks/` says under `effects`, so that the run and the checks know what follows from a hook."
+            .to_owned(),
+        columns: ["Effect", "Parameter", "What the program makes of it"],
+        rows: HookEffect::ALL
+            .iter()
+            .map(|effect| plain(effect.word(), effect.parameter().unwrap_or_default(), effect.doc()))
             .collect(),
     });
     all.push(Section {

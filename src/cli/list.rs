@@ -13,7 +13,7 @@ use tck_base::diagnostic::{self, Diagnostic};
 use tck_checks as checks;
 use tck_judge::Library;
 use tck_pack::{Pack, Requirement, Role};
-use tck_profile::{HOOKS, VEHICLE_WORDS};
+use tck_profile::VEHICLE_WORDS;
 use tck_reference::Fault;
 use tck_report::coverage;
 use tck_run::sources;
@@ -38,7 +38,9 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
         .map_or_else(|| vec![Role::Agv, Role::MasterControl], |role| vec![role]);
     let text = match (arguments.what, arguments.format) {
         (Listing::Tests, format) => {
-            let all = roles.iter().map(|role| Ok((*role, filtered(arguments, &library, &pack, *role)?)));
+            let all = roles
+                .iter()
+                .map(|role| Ok((*role, filtered(arguments, &library, &pack, *role)?)));
             let all: Vec<_> = all.collect::<Result<_, Diagnostic>>()?;
             if all.iter().all(|(_, tests)| tests.is_empty()) {
                 return Err(Problem::NothingToDo("no test is like that".to_owned()));
@@ -53,7 +55,11 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
         }
         (Listing::Requirements, Format::Text) if arguments.page => {
             let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
-            let meant = |role: &str| arguments.role.is_none_or(|wanted| role == wanted.word() || role == "both");
+            let meant = |role: &str| {
+                arguments
+                    .role
+                    .is_none_or(|wanted| role == wanted.word() || role == "both")
+            };
             tck_report::markdown::requirements(&quoted, &pack.version.to_string(), meant)
         }
         (Listing::Requirements, Format::Text) => requirements(&library, &pack, &roles),
@@ -63,7 +69,11 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
         })),
         (Listing::Monitors, Format::Text) => monitors(&library, &pack, &roles),
         (Listing::Monitors, Format::Json) => lines(of_version(&library, &pack, &roles).map(|monitor| {
-            let decides: Vec<&str> = monitor.checks.iter().map(|binding| binding.requirement.as_str()).collect();
+            let decides: Vec<&str> = monitor
+                .checks
+                .iter()
+                .map(|binding| binding.requirement.as_str())
+                .collect();
             json!({ "id": monitor.id, "title": monitor.title, "requirements": decides })
         })),
         (Listing::Coverage, format) => {
@@ -88,31 +98,55 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
             text
         }
         (Listing::Faults, Format::Text) => {
-            let all = roles.iter().map(|role| format!("{role}\n\n{}\n", ui::faults(BuiltIn::faults(*role), |name| BuiltIn::lapse(*role, name))));
+            let all = roles.iter().map(|role| {
+                format!(
+                    "{role}\n\n{}\n",
+                    ui::faults(BuiltIn::faults(*role), |name| BuiltIn::lapse(*role, name))
+                )
+            });
             all.collect()
         }
         (Listing::Faults, Format::Json) => {
-            let all = roles.iter().flat_map(|role| BuiltIn::faults(*role).iter().map(move |fault| (role, fault)));
+            let all = roles
+                .iter()
+                .flat_map(|role| BuiltIn::faults(*role).iter().map(move |fault| (role, fault)));
             lines(all.map(|(role, fault)| json!({ "name": fault.name, "role": role.word(), "breaks": fault.breaks, "wrong": fault.wrong, "lapse": BuiltIn::lapse(*role, fault.name) })))
         }
         (Listing::Tolerances, Format::Text) => {
-            let all = roles.iter().map(|role| format!("{role}\n\n{}\n", ui::tolerances(BuiltIn::tolerances(*role))));
+            let all = roles
+                .iter()
+                .map(|role| format!("{role}\n\n{}\n", ui::tolerances(BuiltIn::tolerances(*role))));
             all.collect()
         }
         (Listing::Tolerances, Format::Json) => {
-            let all = roles.iter().flat_map(|role| BuiltIn::tolerances(*role).iter().map(move |one| (role, one)));
-            lines(all.map(|(role, one)| json!({ "name": one.name, "role": role.word(), "under": one.under, "does": one.does })))
+            let all = roles
+                .iter()
+                .flat_map(|role| BuiltIn::tolerances(*role).iter().map(move |one| (role, one)));
+            lines(all.map(
+                |(role, one)| json!({ "name": one.name, "role": role.word(), "under": one.under, "does": one.does }),
+            ))
         }
-        (Listing::Hooks, Format::Text) => ui::hooks(HOOKS),
-        (Listing::Hooks, Format::Json) => lines(HOOKS.iter().map(|hook| {
-            json!({ "name": hook.name, "role": hook.role.word(), "parameters": hook.parameters, "doc": hook.doc })
+        (Listing::Hooks, Format::Text) => ui::hooks(&library.rules.hooks),
+        (Listing::Hooks, Format::Json) => lines(library.rules.hooks.all().map(|hook| {
+            let parameters: Vec<&str> = hook
+                .parameters
+                .iter()
+                .map(|parameter| parameter.name.as_str())
+                .collect();
+            json!({ "name": hook.name, "role": hook.role.word(), "parameters": parameters, "doc": hook.doc })
         })),
         (Listing::Language, Format::Text) => super::language::page(&library).map_err(Problem::Environment)?,
-        (Listing::Language, Format::Json) => lines(super::language::objects(&library).map_err(Problem::Environment)?.into_iter()),
+        (Listing::Language, Format::Json) => lines(
+            super::language::objects(&library)
+                .map_err(Problem::Environment)?
+                .into_iter(),
+        ),
         (Listing::Vehicle, Format::Text) => ui::vehicle_words(VEHICLE_WORDS),
-        (Listing::Vehicle, Format::Json) => lines(VEHICLE_WORDS.iter().map(|word| {
-            json!({ "name": word.name, "parameters": word.parameters, "doc": word.doc })
-        })),
+        (Listing::Vehicle, Format::Json) => lines(
+            VEHICLE_WORDS
+                .iter()
+                .map(|word| json!({ "name": word.name, "parameters": word.parameters, "doc": word.doc })),
+        ),
     };
     super::print(&text)
 }
@@ -284,11 +318,12 @@ pub fn explain(arguments: &Explain) -> Result<Exit, Problem> {
             check.decides.join(", ")
         );
     }
-    for hook in HOOKS.iter().filter(|hook| hook.name == id) {
-        let _ = writeln!(text, "hook {id} (role {})\n\n{}", hook.role, hook.doc);
-        if !hook.parameters.is_empty() {
-            let _ = writeln!(text, "parameters: {}", hook.parameters.join(", "));
+    for hook in library.rules.hooks.named(id) {
+        let tests = super::explained::using(hook, &library);
+        if !text.is_empty() {
+            text.push('\n');
         }
+        text.push_str(&ui::hook(hook, &library.rules.hooks, tests.len()));
     }
     if let Some(doc) = super::explained::setting(id) {
         let _ = writeln!(text, "setting {id} of a profile\n\n{doc}");
@@ -317,7 +352,7 @@ pub fn explain(arguments: &Explain) -> Result<Exit, Problem> {
             .chain(suites.tests.iter().map(|test| test.id.as_str()))
             .chain(suites.monitors.iter().map(|monitor| monitor.id.as_str()))
             .chain(checks::REGISTRY.iter().map(|check| check.name))
-            .chain(HOOKS.iter().map(|hook| hook.name))
+            .chain(library.rules.hooks.all().map(|hook| hook.name.as_str()))
             .chain(all_faults().map(|fault| fault.name))
             .chain(super::explained::settings().map(|(name, _)| name))
             .collect();

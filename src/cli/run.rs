@@ -65,13 +65,14 @@ struct Job {
 /// `run`.
 pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit, Problem> {
     let surroundings = Surroundings::of_process();
+    let library = crate::assets::library(arguments.suites.own())?;
     let effective = profile::load(
         arguments.device.profile.as_deref(),
         &[arguments.device.settings(), arguments.said.clone()].concat(),
         &surroundings,
+        &library.rules.hooks,
     )?;
     let built_in = reference::is_tested(&Asked::of_run(arguments), &effective, &surroundings)?;
-    let library = crate::assets::library(arguments.suites.own())?;
     if let Some(own) = library.own() {
         super::tell(&own);
     }

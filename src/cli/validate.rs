@@ -177,13 +177,15 @@ fn check(name: &str, bytes: &[u8], path: &Path, arguments: &Validate, library: &
         .unwrap_or_default();
     if extension == "toml" || (extension != "json" && looks_like_toml(text)) {
         let folder = path.parent().unwrap_or(Path::new(""));
-        return Ok(match profile::check(&Source::new(name, text), folder) {
-            Ok(effective) => match super::plan::validated(&effective, library) {
-                Ok(what) => Found::Good(what),
+        return Ok(
+            match profile::check(&Source::new(name, text), folder, &library.rules.hooks) {
+                Ok(effective) => match super::plan::validated(&effective, library) {
+                    Ok(what) => Found::Good(what),
+                    Err(all) => Found::Bad(all),
+                },
                 Err(all) => Found::Bad(all),
             },
-            Err(all) => Found::Bad(all),
-        });
+        );
     }
     if extension == "json" || text.trim_start().starts_with('{') {
         return one(name, bytes, arguments, library);
@@ -195,12 +197,16 @@ fn check(name: &str, bytes: &[u8], path: &Path, arguments: &Validate, library: &
     })
 }
 
-/// A file of suites that is no test, state or monitor: requirements, or stimuli.
+/// A file of suites that is no test, state or monitor: requirements, hooks, or stimuli.
 fn beside_tests(name: &str, text: &str, path: &Path, library: &Library) -> Option<Result<String, Vec<Diagnostic>>> {
     let has = |key: &str| text.lines().any(|line| line.starts_with(key));
     if has("requirements:") || has("chapter:") {
         let count = Catalogue::check_text(name, text);
         return Some(count.map(|count| format!("a file of {}", many(count, "requirement"))));
+    }
+    if has("hooks:") {
+        let count = library.rules.hooks.check_text(name, text);
+        return Some(count.map(|count| format!("a file of {}", many(count, "hook"))));
     }
     let folder = path.parent()?;
     let role = [Role::Agv, Role::MasterControl]

@@ -2,18 +2,18 @@
 
 use std::fmt::Write as _;
 
-use tck_pack::Role;
-use tck_profile::{HookInfo, VehicleWord};
+use tck_pack::{Hooks, Role};
+use tck_profile::VehicleWord;
 use tck_reference::Fault;
 use tck_reference::deviations::agv::Tolerance;
 
 /// Every hook with its parameters, by role.
 #[must_use]
-pub fn hooks(hooks: &[HookInfo]) -> String {
-    let width = hooks.iter().map(|hook| hook.name.len()).max().unwrap_or(0);
+pub fn hooks(hooks: &Hooks) -> String {
+    let width = hooks.all().map(|hook| hook.name.len()).max().unwrap_or(0);
     let mut text = String::new();
     for role in [Role::Agv, Role::MasterControl] {
-        let mut of_role = hooks.iter().filter(|hook| hook.role == role).peekable();
+        let mut of_role = hooks.of(role).peekable();
         if of_role.peek().is_none() {
             continue;
         }
@@ -27,7 +27,11 @@ pub fn hooks(hooks: &[HookInfo]) -> String {
         for hook in of_role {
             let _ = write!(text, "  {:<width$}  {}", hook.name, hook.doc);
             if !hook.parameters.is_empty() {
-                let placeholders: Vec<String> = hook.parameters.iter().map(|name| format!("{{{name}}}")).collect();
+                let placeholders = hook
+                    .parameters
+                    .iter()
+                    .map(|parameter| format!("{{{}}}", parameter.name));
+                let placeholders: Vec<String> = placeholders.collect();
                 let _ = write!(text, " {}", placeholders.join(" "));
             }
             text.push('\n');
@@ -86,11 +90,12 @@ pub fn tolerances(tolerances: &[Tolerance]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tck_profile::{HOOKS, VEHICLE_WORDS};
+    use tck_profile::VEHICLE_WORDS;
 
     #[test]
     fn hooks_are_listed_by_role_with_their_parameters() {
-        insta::assert_snapshot!(hooks(HOOKS));
+        let library = crate::library(None).expect("the built-in suites");
+        insta::assert_snapshot!(hooks(&library.rules.hooks));
     }
 
     #[test]

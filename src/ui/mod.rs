@@ -5,6 +5,7 @@
 
 mod full_screen;
 mod heartbeat;
+mod hook;
 mod keyboard;
 mod listing;
 mod output;
@@ -15,6 +16,7 @@ mod watching;
 
 pub use full_screen::FullScreen;
 pub use heartbeat::Heartbeat;
+pub use hook::hook;
 pub use listing::{faults, hooks, tolerances, vehicle_words};
 pub use output::{Output, escaped};
 pub use progress::{Progress, RunTitle, TestLine};

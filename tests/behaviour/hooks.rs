@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::bench::{Bench, Profile};
+use crate::broken::started_by_the_harness;
 use crate::certificates;
 use crate::https::Server;
 use crate::tool::{Running, tool};
@@ -139,4 +140,115 @@ fn a_server_that_nobody_vouches_for_and_a_token_that_is_not_there_are_named() {
         .run(&["run", "--profile", "device.toml", STOP])
         .code(2)
         .says("NO_SUCH_TOKEN");
+}
+
+/// A suite, requirements and a hook of one's own.
+fn own() -> String {
+    format!("{}/fixtures/own", env!("CARGO_MANIFEST_DIR"))
+}
+
+#[test]
+fn a_hook_of_own_suites_is_done_at_the_vehicle_and_judged_by_its_test() {
+    const TEST: &str = "sys/key-switch";
+    let (bench, own) = (Bench::new(), own());
+    let device = started_by_the_harness();
+    let profile = Profile {
+        device: device.replacen(']', ", \"--hooks\", \"127.0.0.1:{free-port}\"]", 1),
+        more: "[hooks.turn-key]\nhttp = { url = \"http://127.0.0.1:{free-port}/hooks/set-mode\", body = '{ \"mode\": \"{to}\" }' }\n"
+            .to_owned(),
+        ..Profile::default()
+    };
+    let (run, _) = bench.start(&profile, &["--suites", &own, TEST]);
+    run.end().code(0);
+    let test = bench.result()["tests"][0].clone();
+    assert_eq!(
+        (&test["id"], &test["verdict"]),
+        (&TEST.into(), &"pass".into()),
+        "{test}"
+    );
+    assert_eq!(bench.journal().matches("\"hook\":\"turn-key\"").count(), 2);
+    bench
+        .run(&["report", "reports/latest", "--rejudge", "--suites", &own])
+        .code(0);
+    // The folder is what makes it known.
+    bench
+        .run(&["run", "--profile", "device.toml", "state/idle"])
+        .code(2)
+        .says("there is no hook `turn-key`")
+        .says("one of suites of your own is known with `--suites`");
+    // Whose key switch does nothing is found out.
+    let profile = Profile {
+        more: "[hooks.turn-key]\nrun = [\"true\"]\n".to_owned(),
+        device,
+        ..Profile::default()
+    };
+    let (run, _) = bench.start(&profile, &["--suites", &own, TEST]);
+    run.end().code(1);
+}
+
+#[test]
+fn a_hook_of_own_suites_is_explained_and_listed() {
+    let (bench, own) = (Bench::new(), own());
+    let explained = bench.run(&["explain", "turn-key", "--suites", &own]).code(0);
+    for line in [
+        "hook turn-key (role agv)",
+        "[hooks.turn-key]",
+        "run = [\"./turn-key\", \"{to}\"]",
+        "    POST /hooks/turn-key HTTP/1.1",
+        "    {\"to\": \"AUTOMATIC\"}",
+        "used by     1 test",
+    ] {
+        assert!(
+            explained.stdout.lines().any(|known| known == line),
+            "{line}\n{}",
+            explained.stdout
+        );
+    }
+    for listing in ["hooks", "language"] {
+        bench
+            .run(&["list", listing, "--suites", &own])
+            .code(0)
+            .prints("turn-key");
+    }
+    bench
+        .run(&["validate", "--suites", &own, &format!("{own}/hooks/sys.yaml")])
+        .code(0)
+        .prints("a file of 1 hook");
+    bench.run(&["explain", "turn-key"]).code(2);
+}
+
+#[test]
+fn mistakes_in_own_hooks_are_named_with_their_place() {
+    let bench = Bench::new();
+    std::fs::create_dir_all(bench.path().join("own/hooks")).unwrap();
+    std::fs::create_dir_all(bench.path().join("own/agv/sys")).unwrap();
+    let test = std::fs::read_to_string(format!("{}/agv/sys/keeps-the-number.yaml", own())).unwrap();
+    let test = test.replace("SYS-12", "ORD-MSG-01");
+    std::fs::write(bench.path().join("own/agv/sys/keeps-the-number.yaml"), test).unwrap();
+    let good = std::fs::read_to_string(format!("{}/hooks/sys.yaml", own())).unwrap();
+    for (wrong, line, says) in [
+        (
+            "    effects: [turns-round]\n",
+            14,
+            "`turns-round` is not known for `effects`",
+        ),
+        (
+            "    undoes: pull-key\n",
+            14,
+            "there is no hook `pull-key` for a device of role `agv`",
+        ),
+        (
+            "  - hook: set-mode\n    does: Switch.\n",
+            14,
+            "the hook `set-mode` for a second time",
+        ),
+    ] {
+        std::fs::write(bench.path().join("own/hooks/sys.yaml"), format!("{good}{wrong}")).unwrap();
+        bench
+            .run(&["run", "--virtual", "--suites", "own", "sys/*"])
+            .code(2)
+            .says(says)
+            .says(&format!("suites/hooks/sys.yaml:{line}:"))
+            .says("help: ");
+    }
 }

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use crate::finding::{broken, remark, show, unclear};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::{Event, Packet};
-use tck_pack::Role;
+use tck_pack::{HookEffect, HookInfo, Role};
 use tck_view::{Header, Member, Number};
 use tck_world::{Listen, Observation, Topic};
 
@@ -34,9 +34,6 @@ pub(super) const ID_RISES: Check = Check {
     start: |_| Box::new(IdRises::default()),
 };
 
-/// Hooks of a master control after which it may count anew.
-const RESTARTS: [&str; 3] = ["start", "shutdown", "configure"];
-
 #[derive(Default)]
 struct IdRises {
     /// The last id per topic name; there are only a handful of names.
@@ -61,9 +58,11 @@ impl Running for IdRises {
             // The process goes on when the harness breaks its link, and so may its count.
             Event::Fault { .. } => self.before_cut.append(&mut self.last),
             // What makes a master control act does not restart it.
-            Event::Hook { hook, .. } if context.role == Role::MasterControl && !RESTARTS.contains(&hook.as_str()) => {}
+            Event::Hook { hook, .. }
+                if context.role == Role::MasterControl && !context.hook(hook).is_some_and(HookInfo::may_restart) => {}
             // Its farewell belongs to the count, and at the tap nothing is lost on the way.
-            Event::Hook { hook, .. } if record.link.tap && hook == "shutdown" => {}
+            Event::Hook { hook, .. }
+                if record.link.tap && context.hook(hook).is_some_and(|hook| hook.has(HookEffect::ShutsDown)) => {}
             // Messages may be lost on the way while the harness plays with the link or somebody with the device.
             Event::Hook { .. } | Event::Answer { .. } | Event::Undecodable { .. } => {
                 self.last.clear();

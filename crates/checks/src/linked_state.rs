@@ -11,6 +11,7 @@ use crate::finding::{broken, quote, show};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::Event;
+use tck_pack::HookChange;
 use tck_view::{ActionState, ActionView, Json, Member, Number, Pose, StateView, Text};
 use tck_world::{Fact, Listen, Observation, Topic, sets_position};
 
@@ -76,54 +77,32 @@ struct Linked {
     /// Seen FINISHED or FAILED.
     ended: BTreeSet<String>,
     /// When a person or a hook last had a hand in something.
-    touched: BTreeMap<&'static str, Moment>,
+    touched: BTreeMap<HookChange, Moment>,
     /// orderId of the last state, if there was one since the start or a restart.
     order: Option<String>,
 }
 
-/// Everything that is looked at.
-const TOPICS: [&str; 5] = ["pause", "charging", "maps", "pose", "order"];
-
 /// What two actions may both change.
-fn topic(kind: &str) -> Option<&'static str> {
+fn topic(kind: &str) -> Option<HookChange> {
     match kind {
-        "startPause" | "stopPause" => Some("pause"),
-        "startCharging" | "stopCharging" => Some("charging"),
-        "enableMap" | "deleteMap" => Some("maps"),
-        "cancelOrder" => Some("order"),
-        kind if sets_position(kind) => Some("pose"),
+        "startPause" | "stopPause" => Some(HookChange::Pause),
+        "startCharging" | "stopCharging" => Some(HookChange::Charging),
+        "enableMap" | "deleteMap" => Some(HookChange::Maps),
+        "cancelOrder" => Some(HookChange::Order),
+        kind if sets_position(kind) => Some(HookChange::Position),
         _ => None,
     }
 }
 
-/// What a hook may have changed beside the protocol, or a person. Loads, obstacles and triggers are none of it.
-fn touched(record: &Observation<'_>) -> &'static [&'static str] {
-    let Event::Hook { hook, .. } = record.event() else {
-        let answered = matches!(record.event(), Event::Answer { .. });
-        return if answered { &TOPICS } else { &[] };
-    };
-    match hook.as_str() {
-        // What these do is seen in the state for as long as it holds, or in a new connection, or is none of it.
-        "place-load"
-        | "remove-load"
-        | "trigger"
-        | "confirm"
-        | "place-obstacle"
-        | "remove-obstacle"
-        | "set-mode"
-        | "emergency-stop"
-        | "release-emergency-stop"
-        | "enter-field"
-        | "leave-field"
-        | "provoke-error"
-        | "clear-error"
-        | "power-cycle"
-        | "shutdown"
-        | "start" => &[],
-        "press-pause" | "release-pause" | "block-pause" | "unblock-pause" => &["pause"],
-        "lock-charger" | "unlock-charger" => &["charging"],
-        "enable-map" => &["maps", "pose"],
-        _ => &TOPICS,
+/// What a hook may have changed beside the protocol, or a person.
+fn touched<'c>(record: &Observation<'_>, context: &CheckContext<'c>) -> &'c [HookChange] {
+    match record.event() {
+        Event::Hook { hook, .. } => match context.hook(hook) {
+            Some(hook) => hook.changes(),
+            None => &HookChange::ALL,
+        },
+        Event::Answer { .. } => &HookChange::ALL,
+        _ => &[],
     }
 }
 
@@ -293,8 +272,8 @@ impl Running for Linked {
         findings: &mut Vec<CheckFinding>,
     ) -> bool {
         self.learn(record);
-        for topic in touched(record) {
-            self.touched.insert(topic, record.at().moment);
+        for topic in touched(record, context) {
+            self.touched.insert(*topic, record.at().moment);
         }
         if context.world.restarts().now(record) {
             self.order = None;
@@ -306,7 +285,7 @@ impl Running for Linked {
         let same_order = self.order.as_ref() == Some(&order);
         let begun = self.order.replace(order).is_some();
         let now = record.at().moment;
-        let left_alone = |topic| self.touched.get(topic).is_none_or(|at| now.since(*at) > INFLUENCE);
+        let left_alone = |topic| self.touched.get(&topic).is_none_or(|at| now.since(*at) > INFLUENCE);
         let still = state.driving.is(false);
         let listed: Vec<(&str, &str)> = state
             .action_states
@@ -336,9 +315,9 @@ impl Running for Linked {
                 other.is_some_and(|other| topic(&other.kind) == topic(&known.kind))
             });
             let fits = match topic(&known.kind) {
-                Some("pause") => true,
+                Some(HookChange::Pause) => true,
                 // Another order may have come in between.
-                Some("order") => same_order,
+                Some(HookChange::Order) => same_order,
                 _ => still,
             };
             let free = topic(&known.kind).is_some_and(left_alone);

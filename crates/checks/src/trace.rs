@@ -13,7 +13,7 @@ use tck_base::verdict::Verdict;
 use tck_check::{Check, CheckContext, CheckFinding, Shared, find};
 use tck_journal::event::{Close, Direction, Event, LinkFault, Occurrence, Packet, RunHeader, Source, Will};
 use tck_journal::{Entry, Journal, Payload};
-use tck_pack::{Assets, Pack, Packs, Role};
+use tck_pack::{Assets, Hooks, Pack, Packs, Role};
 use tck_world::{Listen, Listens, Observer, Setting, World};
 
 use super::REGISTRY;
@@ -359,6 +359,7 @@ impl Trace {
             identity: ("acme", &self.serial),
             bindings: &bindings,
             time: &time,
+            hooks: &HOOKS,
         };
         let check = find(REGISTRY, name).expect("known check");
         let outcome = self.outcome(check, check.listens, setting);
@@ -415,6 +416,8 @@ impl Trace {
         }
     }
 }
+
+static HOOKS: LazyLock<Hooks> = LazyLock::new(|| Hooks::load(&Assets::of_source_tree().unwrap()).unwrap());
 
 /// The protocol version the checks are tested with.
 pub(super) fn pack() -> Arc<Pack> {

@@ -7,6 +7,7 @@ use proptest::prelude::*;
 
 use super::*;
 use tck_base::diagnostic::{Diagnostic, Source};
+use tck_pack::{Assets, Hooks};
 use tck_profile::{SampleAction, SampleActions};
 
 fn fixture(name: &str) -> Arc<Source> {
@@ -373,7 +374,8 @@ fn a_huge_floor_is_given_up_rather_than_searched_for_ever() {
 
 fn layout_of(profile: &str) -> Result<Option<Layout>, Vec<Diagnostic>> {
     let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("fixtures/profiles/good");
-    let effective = tck_profile::check(&Source::new("device.toml", profile), &folder).expect("a profile");
+    let hooks = Hooks::load(&Assets::of_source_tree().expect("suites")).expect("hooks");
+    let effective = tck_profile::check(&Source::new("device.toml", profile), &folder, &hooks).expect("a profile");
     Layout::of_profile(&effective.profile)
 }
 

@@ -10,7 +10,7 @@ use super::{Engine, EngineError, HookOutcome, Operator, operator};
 use tck_base::clock::Moment;
 use tck_journal::event::{Event, Occurrence, Source, StepEnd};
 use tck_net::link::Link;
-use tck_pack::Role;
+use tck_pack::{HookEffect, Role};
 use tck_profile::show_duration;
 use tck_suite::model::{Section, Step, VehicleStep, Which};
 
@@ -173,6 +173,15 @@ impl<L: Link, O: Operator> Engine<L, O> {
         };
         self.note(event)?;
         Ok(if ok { StepEnd::Decided } else { StepEnd::Broken(detail) })
+    }
+
+    /// The hook with this effect that can be run, if there is one.
+    pub fn hook_that(&self, effect: HookEffect) -> Option<String> {
+        let can_be_run = self.operator.hooks();
+        let ground = self.recorder.judge().ground();
+        let mut known = ground.hooks.with(effect, ground.role);
+        let found = known.find(|name| can_be_run.iter().any(|hook| hook == name))?;
+        Some(found.to_owned())
     }
 
     /// Sets a mock AGV of the harness, journal first. `false` when there is none of that number.

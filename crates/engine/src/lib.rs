@@ -33,6 +33,7 @@ use tck_journal::event::{Event, Occurrence, Payload, StepEnd};
 use tck_judge::{JudgeError, Progress, Sign, TestJudge};
 use tck_net::bench::{LinkError, Offer, Outgoing};
 use tck_net::link::Link;
+use tck_pack::HookEffect;
 use tck_suite::model::{Purpose, Section, Step, Test, Verb};
 
 /// More time than this is not left between two orders.
@@ -201,7 +202,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
                     // A master control has to hear that the vehicle is done before somebody moves it.
                     Some(Purpose::Waits | Purpose::Undoes) | None => false,
                 };
-                if passed_over || (section == Section::Finally && is_releasing(step) && self.is_released(begun)) {
+                if passed_over || (section == Section::Finally && self.is_releasing(step) && self.is_released(begun)) {
                     continue;
                 }
                 let goes_on = self
@@ -257,12 +258,23 @@ impl<L: Link, O: Operator> Engine<L, O> {
         !open && vehicle::has_nothing_to_do(judge)
     }
 
+    /// Whether a hook releases a pressed emergency stop.
+    fn releases(&self, hook: &str) -> bool {
+        let ground = self.recorder.judge().ground();
+        let hook = ground.hooks.find(hook, ground.role);
+        hook.is_some_and(|hook| hook.has(HookEffect::ReleasesEmergencyStop))
+    }
+
+    fn is_releasing(&self, step: &Step) -> bool {
+        matches!(&step.verb, Verb::Operator(operator) if self.releases(&operator.hook))
+    }
+
     /// Whether this test has released the emergency stop already, and the device has shown that since: nobody is asked twice.
     fn is_released(&self, begun: u64) -> bool {
         let entries = self.recorder.journal().entries();
         let mut own = entries.iter().rev().take_while(|entry| entry.seq() > begun);
         let last = own.find_map(|entry| match entry.event() {
-            Event::Hook { hook, ok: true, .. } => Some((hook == RELEASE, entry.seq())),
+            Event::Hook { hook, ok: true, .. } => Some((self.releases(hook), entry.seq())),
             Event::Hook { .. } => Some((false, 0)),
             _ => None,
         });
@@ -508,11 +520,4 @@ fn time_for(test: &TestJudge, probed: bool) -> Option<Moment> {
         Progress::NeedsProbe(ends) if !probed => Some(ends),
         Progress::NeedsProbe(ends) => Some(test.probe_until().unwrap_or(ends)),
     }
-}
-
-/// The hook that releases an emergency stop.
-const RELEASE: &str = "release-emergency-stop";
-
-fn is_releasing(step: &Step) -> bool {
-    matches!(&step.verb, Verb::Operator(operator) if operator.hook == RELEASE)
 }

@@ -9,7 +9,7 @@ use super::rules::{JudgeError, Rules};
 use tck_base::time::TimeLimits;
 use tck_check::Check;
 use tck_journal::event::{RunHeader, Waiver};
-use tck_pack::{Catalogue, Pack, Role};
+use tck_pack::{Catalogue, Hooks, Pack, Role};
 use tck_view::{FactsheetView, MessageView, Topic};
 use tck_world::Setting;
 
@@ -31,6 +31,8 @@ pub struct Ground {
     pub bindings: Arc<Map<String, Value>>,
     /// The limits among them.
     pub time: TimeLimits,
+    /// What can be done to the device, and what follows from it.
+    pub hooks: Arc<Hooks>,
     /// Lasting mistakes of the vehicle that do not stand in the way any more.
     pub waivers: Vec<Waiver>,
     /// Why what is found at present may stem from somebody else: one on the tap, or who has interrupted the run.
@@ -62,6 +64,7 @@ impl Ground {
             identity: (&self.identity.0, &self.identity.1),
             bindings: &self.bindings,
             time: &self.time,
+            hooks: &self.hooks,
         }
     }
 }
@@ -97,6 +100,7 @@ impl Grounds {
             identity: (manufacturer.to_owned(), serial_number.to_owned()),
             bindings: Arc::clone(&bindings),
             time: TimeLimits::of_bindings(&bindings),
+            hooks: Arc::clone(&rules.hooks),
             waivers: Vec::new(),
             interference: None,
             is_interrupted: false,

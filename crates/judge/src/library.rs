@@ -5,10 +5,9 @@ use std::sync::Arc;
 use super::rules::Rules;
 use tck_base::diagnostic::Diagnostic;
 use tck_check::Check;
-use tck_pack::{Assets, Catalogue, Packs, Role};
-use tck_profile::HOOKS;
+use tck_pack::{Assets, Catalogue, Hooks, Packs, Role};
 use tck_suite::model::Test;
-use tck_suite::{CheckInfo, HookFacts, Suites};
+use tck_suite::{CheckInfo, Suites};
 
 /// The loaded data.
 #[derive(Clone)]
@@ -27,7 +26,8 @@ impl Library {
     pub fn load(assets: Assets, checks: &'static [Check]) -> Result<Self, Vec<Diagnostic>> {
         let packs = Packs::load(&assets).map_err(|error| vec![Diagnostic::whole("pack", error.to_string())])?;
         let catalogue = Catalogue::load(&assets)?;
-        let suites = Suites::load(&assets, &packs, &catalogue, &check_infos(checks), &hook_facts())?;
+        let hooks = Hooks::load(&assets)?;
+        let suites = Suites::load(&assets, &packs, &catalogue, &check_infos(checks), &hooks)?;
         let sha256 = assets.sha256().to_owned();
         Ok(Self {
             assets,
@@ -35,6 +35,7 @@ impl Library {
                 checks,
                 packs: Arc::new(packs),
                 catalogue: Arc::new(catalogue),
+                hooks: Arc::new(hooks),
                 suites: Arc::new(suites),
                 sha256,
             },
@@ -56,6 +57,7 @@ impl Library {
             (files("suites/monitors/"), "monitor"),
             (files("suites/explore/"), "file of stimuli"),
             (files("suites/requirements/"), "file of requirements"),
+            (files("suites/hooks/"), "file of hooks"),
         ];
         let all = all.into_iter().filter(|(count, _)| *count > 0);
         let all = all.map(|(count, what)| match (count, what.split_once(' ')) {
@@ -96,7 +98,7 @@ impl Library {
             &rules.packs,
             &rules.catalogue,
             &check_infos(rules.checks),
-            &hook_facts(),
+            &rules.hooks,
         )?;
         let suites = rules.suites.with(&tests).map_err(|taken| {
             let complaint = |id: String| {
@@ -122,7 +124,7 @@ impl Library {
             &rules.packs,
             &rules.catalogue,
             &check_infos(rules.checks),
-            &hook_facts(),
+            &rules.hooks,
         )?;
         Ok(match (found.tests.len(), found.monitors.len()) {
             (0, 0) => "a state".to_owned(),
@@ -141,17 +143,6 @@ fn check_infos(checks: &[Check]) -> Vec<CheckInfo> {
             decides: check.decides,
             arguments: check.arguments,
             needs: check.needs,
-        })
-        .collect()
-}
-
-fn hook_facts() -> Vec<HookFacts> {
-    HOOKS
-        .iter()
-        .map(|hook| HookFacts {
-            name: hook.name,
-            role: hook.role,
-            parameters: hook.parameters,
         })
         .collect()
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use tck_check::Check;
-use tck_pack::{Catalogue, Packs};
+use tck_pack::{Catalogue, Hooks, Packs};
 use tck_suite::Suites;
 
 /// The rules a run is judged by.
@@ -15,6 +15,8 @@ pub struct Rules {
     pub packs: Arc<Packs>,
     /// The requirements.
     pub catalogue: Arc<Catalogue>,
+    /// What can be done to a device, and what follows from it.
+    pub hooks: Arc<Hooks>,
     /// Tests and monitors.
     pub suites: Arc<Suites>,
     /// SHA-256 over suites, schemas and requirements.

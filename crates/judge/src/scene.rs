@@ -11,7 +11,7 @@ use tck_base::time::TimeLimits;
 use tck_check::Check;
 use tck_journal::Entry;
 use tck_journal::event::Waiver;
-use tck_pack::{Pack, Role};
+use tck_pack::{Hooks, Pack, Role};
 use tck_world::Setting;
 
 /// Everything around a step.
@@ -31,6 +31,8 @@ pub struct Scene<'a> {
     pub run_bindings: &'a Map<String, Value>,
     /// How long something may take.
     pub time: &'a TimeLimits,
+    /// What can be done to the device, and what follows from it.
+    pub hooks: &'a Hooks,
     /// All variables of the test.
     pub bindings: &'a Bindings,
     /// By subject.
@@ -51,6 +53,7 @@ impl<'a> Scene<'a> {
             identity: self.identity,
             bindings: self.run_bindings,
             time: self.time,
+            hooks: self.hooks,
         }
     }
 }

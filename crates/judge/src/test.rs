@@ -214,6 +214,7 @@ impl TestJudge {
             identity: (&ground.identity.0, &ground.identity.1),
             run_bindings: &ground.bindings,
             time: &ground.time,
+            hooks: &ground.hooks,
             bindings: &self.bindings,
             timeline,
             entries: &self.entries,

@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use serde::de::DeserializeOwned;
-
+use super::reader::Reader;
 use super::{Decided, Requirement, RequirementId, VersionNote};
-use tck_base::diagnostic::{Diagnostic, Source, Span, did_you_mean};
+use tck_base::diagnostic::{Diagnostic, Source, Span};
 use tck_base::yaml::{self, Node};
 
 /// The requirements of one group, in the order written.
@@ -26,7 +25,7 @@ pub(super) fn read(source: &Arc<Source>, problems: &mut Vec<Diagnostic>) -> Opti
             return None;
         }
     };
-    let mut reader = Reader { problems };
+    let mut reader = Reader::new("catalogue", problems);
     reader.known(&root, &["group", "chapter", "position", "requirements"]);
     let group = reader.text(&root, "group")?;
     let chapter = reader.text(&root, "chapter")?;
@@ -41,10 +40,6 @@ pub(super) fn read(source: &Arc<Source>, problems: &mut Vec<Diagnostic>) -> Opti
         .filter_map(|item| reader.requirement(item, &group, &chapter))
         .collect();
     Some(Chapter { position, requirements })
-}
-
-struct Reader<'a> {
-    problems: &'a mut Vec<Diagnostic>,
 }
 
 const KEYS: [&str; 11] = [
@@ -138,35 +133,6 @@ impl Reader<'_> {
         Some(versions)
     }
 
-    fn member<'n>(&mut self, node: &'n Node, key: &str) -> Option<&'n Node> {
-        let found = node.get(key);
-        if found.is_none() {
-            let title = format!("`{key}` is missing");
-            self.problem(node, &title, "belongs here", &format!("add `{key}:`"));
-        }
-        found
-    }
-
-    fn text(&mut self, node: &Node, key: &str) -> Option<String> {
-        let member = self.member(node, key)?;
-        self.as_text(member)
-    }
-
-    fn as_text(&mut self, node: &Node) -> Option<String> {
-        match node.text().map(str::trim) {
-            Some(text) if !text.is_empty() => Some(text.to_owned()),
-            Some(_) => {
-                let title = "an empty text where a text is due";
-                self.problem(node, title, "says nothing", "write a text, or take the key out");
-                None
-            }
-            None => {
-                self.wrong(node, "a text");
-                None
-            }
-        }
-    }
-
     fn link(&mut self, node: &Node) -> Option<String> {
         let link = self.as_text(node)?;
         if link.starts_with("https://") || link.starts_with("http://") {
@@ -175,50 +141,6 @@ impl Reader<'_> {
         let title = format!("`{link}` is no link");
         self.problem(node, &title, "leads nowhere", "write https://…");
         None
-    }
-
-    fn list<'n>(&mut self, node: &'n Node, key: &str) -> Option<&'n [Node]> {
-        let member = self.member(node, key)?;
-        if member.list().is_none() {
-            self.wrong(member, "a list");
-        }
-        member.list()
-    }
-
-    fn choice<T: DeserializeOwned>(&mut self, node: &Node, key: &str, words: &[&str]) -> Option<T> {
-        let member = self.member(node, key)?;
-        let word = self.as_text(member)?;
-        if !words.contains(&word.as_str()) {
-            let title = format!("`{word}` is not known for `{key}`");
-            self.problem(
-                member,
-                &title,
-                "unknown word",
-                &did_you_mean(&word, words.iter().copied()),
-            );
-            return None;
-        }
-        serde_json::from_value(word.into()).ok()
-    }
-
-    fn known(&mut self, node: &Node, keys: &[&str]) {
-        for (key, _) in node.map().unwrap_or_default() {
-            let name = key.text().unwrap_or_default();
-            if !keys.contains(&name) {
-                let title = format!("unknown key `{name}`");
-                self.problem(key, &title, "not known here", &did_you_mean(name, keys.iter().copied()));
-            }
-        }
-    }
-
-    fn wrong(&mut self, node: &Node, due: &str) {
-        let title = format!("{} where {due} is due", node.kind_word());
-        self.problem(node, &title, "of another kind", &format!("write {due}"));
-    }
-
-    fn problem(&mut self, node: &Node, title: &str, label: &str, hint: &str) {
-        self.problems
-            .push(Diagnostic::new("catalogue", node.span.clone(), title, label).hint(hint));
     }
 }
 

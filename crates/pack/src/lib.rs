@@ -1,7 +1,7 @@
-//! A protocol version as data, and the catalogue of requirements.
+//! A protocol version as data, the catalogue of requirements, and the vocabulary of hooks.
 //!
 //! A [`Pack`] is one folder of `schemas/`: six JSON schemas, `protocol.toml` and `vocabulary.yaml`. The
-//! [`Catalogue`] is `suites/requirements/`. Both come from [`Assets`], the embedded files
+//! [`Catalogue`] is `suites/requirements/`, [`Hooks`] are `suites/hooks/`. All come from [`Assets`], the embedded files
 //! or a replacement. Versions are data: no code below or above names one. What a message *means* is left to
 //! patterns, checks and the judge.
 #![forbid(unsafe_code)]
@@ -12,8 +12,11 @@ mod breakage;
 mod catalogue;
 mod catalogue_file;
 mod fields;
+mod hooks;
+mod hooks_file;
 mod participant;
 mod protocol;
+mod reader;
 mod schema;
 mod shape;
 mod version;
@@ -24,6 +27,7 @@ mod tests;
 pub use assets::{AssetFile, Assets};
 pub use breakage::{Breakage, Ground, Way};
 pub use catalogue::{Catalogue, Decided, Mood, Requirement, RequirementId, Subject, VersionNote};
+pub use hooks::{HookChange, HookEffect, HookInfo, HookParameter, HookRisk, HookValue, Hooks};
 pub use participant::Participant;
 pub use protocol::{Pack, PackError, Packs, Said, TopicName, TopicRule};
 pub use schema::{Finding, FindingKind, MessageSchema};

@@ -37,23 +37,9 @@ pub enum Claim {
     Statement(String),
     /// `no` and a name of [`STATEMENTS`] or [`SAMPLE_ACTIONS`].
     NoStatement(String),
-    /// `no hook NAME`: it has nothing that the hook could be about, such as a lift or a latch. One of [`EQUIPMENT`].
+    /// `no hook NAME`: it has nothing that the hook could be about, such as a lift or a latch.
     NoHook(String),
 }
-
-/// Hooks about what a vehicle need not have.
-pub const EQUIPMENT: &[&str] = &[
-    "block-pause",
-    "drive-manually",
-    "enable-map",
-    "lock-charger",
-    "press-pause",
-    "release-pause",
-    "trigger",
-    "unblock-pause",
-    "unlock-charger",
-    "use-lift",
-];
 
 const SCOPES: [&str; 3] = ["INSTANT", "NODE", "EDGE"];
 
@@ -84,11 +70,7 @@ impl FromStr for Claim {
                 format!("`{scope}` is not a scope of actions"),
                 diagnostic::did_you_mean(scope, SCOPES),
             )),
-            ["no", "hook", name] if EQUIPMENT.contains(name) => Ok(Self::NoHook((*name).to_owned())),
-            ["no", "hook", name] => Err((
-                format!("a device cannot do without `{name}`"),
-                format!("only these may be missing at a device: {}", EQUIPMENT.join(", ")),
-            )),
+            ["no", "hook", name] => Ok(Self::NoHook((*name).to_owned())),
             ["optional", path] => Ok(Self::Optional((*path).to_owned())),
             ["no", "optional", path] => Ok(Self::NoOptional((*path).to_owned())),
             ["limit", name, "=", value] => match value.parse() {
@@ -227,7 +209,6 @@ mod tests {
             "long-action",
             "limit x = y",
             "limit x 10",
-            "no hook power-cycle",
             "a b c",
         ] {
             let (_, hint) = text.parse::<Claim>().expect_err(text);

@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use super::hook_action::HookAction;
-use super::hooks;
+use super::hook_action::{Hook, HookAction};
 use super::key::{KEYS, SAMPLE_ACTIONS, STATEMENTS};
 use super::layer::Layer;
 use super::value::Value;
@@ -13,7 +12,7 @@ use super::{
     TimeLimits, Vehicles,
 };
 use tck_base::diagnostic::{self, Diagnostic, Span};
-use tck_pack::Role;
+use tck_pack::{Hooks, Role};
 
 /// The profile as it is in force, and where everything in it came from.
 #[derive(Clone, Debug)]
@@ -37,8 +36,8 @@ impl Effective {
 }
 
 /// Checks a merged layer as a whole and turns it into a profile.
-pub(super) fn effective(layer: &Layer) -> Result<Effective, Vec<Diagnostic>> {
-    let taken = Taken { layer };
+pub(super) fn effective(layer: &Layer, hooks: &Hooks) -> Result<Effective, Vec<Diagnostic>> {
+    let taken = Taken { layer, hooks };
     let wrong = taken.contradictions();
     if !wrong.is_empty() {
         return Err(wrong);
@@ -60,6 +59,7 @@ pub(super) fn effective(layer: &Layer) -> Result<Effective, Vec<Diagnostic>> {
 /// The merged layer, read by name.
 struct Taken<'a> {
     layer: &'a Layer,
+    hooks: &'a Hooks,
 }
 
 impl Taken<'_> {
@@ -236,7 +236,10 @@ impl Taken<'_> {
                 .layer
                 .hooks
                 .iter()
-                .map(|(name, (hook, _))| (name.clone(), hook.clone()))
+                .filter_map(|(name, (hook, _))| {
+                    let info = self.hooks.find(name, self.role())?.clone();
+                    Some((name.clone(), Hook { info, ..hook.clone() }))
+                })
                 .collect(),
         }
     }
@@ -351,6 +354,15 @@ impl Taken<'_> {
             wrong.push(self.at("device.node-bound", title, "and `stops-between-nodes` says otherwise"));
         }
         for claim in self.claims() {
+            if let Claim::NoHook(name) = &claim
+                && !self.hooks.find(name, Role::Agv).is_some_and(|hook| hook.optional)
+            {
+                let optional = self.hooks.of(Role::Agv).filter(|hook| hook.optional);
+                let names: Vec<&str> = optional.map(|hook| hook.name.as_str()).collect();
+                let title = format!("a device cannot do without `{name}`");
+                let hint = format!("only these may be missing at a device: {}", names.join(", "));
+                wrong.push(self.at("device.claims", title, "the claims").hint(hint));
+            }
             let (Claim::Statement(name) | Claim::NoStatement(name)) = &claim else {
                 continue;
             };
@@ -364,14 +376,11 @@ impl Taken<'_> {
         }
         let role = self.role();
         for (name, (hook, _)) in &self.layer.hooks {
-            if hooks::find(name, role).is_none() {
+            if self.hooks.find(name, role).is_none() {
                 let title = format!("hook `{name}` is not for a device of role `{role}`");
-                let others = hooks::HOOKS
-                    .iter()
-                    .filter(|info| info.role == role)
-                    .map(|info| info.name);
+                let others: Vec<&str> = self.hooks.of(role).map(|info| info.name.as_str()).collect();
                 let diagnostic = Diagnostic::new("contradiction", hook.span.clone(), title, "for the other side");
-                wrong.push(diagnostic.hint(diagnostic::did_you_mean(name, others)));
+                wrong.push(diagnostic.hint(diagnostic::did_you_mean(name, others.iter().copied())));
             }
         }
         wrong

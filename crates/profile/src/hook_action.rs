@@ -13,12 +13,15 @@ use super::secret::{PasswordError, SecretText};
 use super::surroundings::Surroundings;
 use tck_base::diagnostic::Span;
 use tck_base::secrets::Password;
+use tck_pack::HookInfo;
 
 /// What a profile does when a test asks for a hook.
 #[derive(Clone, Debug)]
 pub struct Hook {
     /// Its name.
     pub name: String,
+    /// What is known of it for the role of the device.
+    pub info: HookInfo,
     /// How it is done.
     pub action: HookAction,
     /// How long it may take.

@@ -1,232 +1,105 @@
-//! Hooks: what a person or a machine does to the device when a test asks for it. [`HOOKS`] is the one set of names.
+//! What a profile can say of a hook, to copy, and the request that comes of it.
 
-use tck_pack::Role;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
 
-/// A hook a test may ask for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct HookInfo {
-    /// Name, as in `[hooks.NAME]` and `operator: NAME`.
-    pub name: &'static str,
-    /// Which side it is for.
-    pub role: Role,
-    /// Names of the parameters a test hands over.
-    pub parameters: &'static [&'static str],
-    /// What to do, as an order to a person.
-    pub doc: &'static str,
-    /// Whether the program of the device may end by it.
-    pub ends: bool,
+use super::hook_action::HookAction;
+use tck_pack::HookInfo;
+
+/// Where `vda5050-tck simulate --hooks` takes requests in the examples.
+const HOST: &str = "127.0.0.1:8080";
+
+/// Three ways in which a profile can have a hook done, as lines of TOML below `[hooks.NAME]`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct HookExample {
+    /// A question to a person.
+    pub prompt: String,
+    /// A program and its arguments.
+    pub run: String,
+    /// An HTTP request.
+    pub http: String,
+    /// That request with a value for each parameter, as it reaches the server.
+    pub request: String,
 }
 
-/// The same hook; the program of the device may end by it.
-const fn ending(hook: HookInfo) -> HookInfo {
-    HookInfo { ends: true, ..hook }
-}
-
-const fn agv(name: &'static str, parameters: &'static [&'static str], doc: &'static str) -> HookInfo {
-    HookInfo {
-        name,
-        role: Role::Agv,
-        parameters,
-        doc,
-        ends: false,
+impl HookExample {
+    /// The examples of a hook.
+    #[must_use]
+    pub fn of(hook: &HookInfo) -> Self {
+        let names: Vec<&str> = hook
+            .parameters
+            .iter()
+            .map(|parameter| parameter.name.as_str())
+            .collect();
+        let listed: Vec<String> = names.iter().map(|name| format!("{name}: {{{name}}}")).collect();
+        let text = match listed.is_empty() {
+            true => hook.doc.clone(),
+            false => format!("{} {}", hook.doc, listed.join(", ")),
+        };
+        let words = std::iter::once(format!("./{}", hook.name)).chain(names.iter().map(|name| format!("{{{name}}}")));
+        let words: Vec<toml::Value> = words.map(toml::Value::String).collect();
+        let url = format!("http://{HOST}/hooks/{}", hook.name);
+        let members: Vec<String> = names.iter().map(|name| format!("\"{name}\": \"{{{name}}}\"")).collect();
+        let body = (!names.is_empty()).then(|| format!("{{{}}}", members.join(", ")));
+        // A literal text of TOML: nothing in it is escaped, and no name has an apostrophe.
+        let with_body = body
+            .as_ref()
+            .map_or_else(String::new, |body| format!(", body = '{body}'"));
+        Self {
+            prompt: format!("prompt = {}", toml::Value::String(text)),
+            run: format!("run = {}", toml::Value::Array(words)),
+            http: format!("http = {{ url = \"{url}\"{with_body} }}"),
+            request: request(hook, url, body),
+        }
     }
 }
 
-const fn master_control(name: &'static str, parameters: &'static [&'static str], doc: &'static str) -> HookInfo {
-    HookInfo {
-        name,
-        role: Role::MasterControl,
-        parameters,
-        doc,
-        ends: false,
+fn request(hook: &HookInfo, url: String, body: Option<String>) -> String {
+    let values = hook.parameters.iter();
+    let values: BTreeMap<String, String> = values
+        .map(|parameter| (parameter.name.clone(), parameter.example.clone()))
+        .collect();
+    let action = HookAction::Http {
+        method: "POST".to_owned(),
+        url,
+        body,
+        headers: Vec::new(),
+    };
+    let HookAction::Http { method, body, .. } = action.filled(&values) else {
+        return String::new();
+    };
+    let mut text = format!("{method} /hooks/{} HTTP/1.1\nHost: {HOST}\n", hook.name);
+    if let Some(body) = body {
+        let _ = write!(text, "Content-Type: application/json\n\n{body}\n");
     }
-}
-
-/// Every hook there is, by role.
-pub const HOOKS: &[HookInfo] = &[
-    agv(
-        "after-start",
-        &[],
-        "Give the vehicle what it needs after every start, before anything else: a position, a login.",
-    ),
-    ending(agv("power-cycle", &[], "Switch the vehicle off hard and on again.")),
-    ending(agv(
-        "shutdown",
-        &[],
-        "Shut the vehicle down, or end its communication, in good order.",
-    )),
-    agv("start", &[], "Start the vehicle after a shutdown."),
-    agv(
-        "set-mode",
-        &["mode"],
-        "Switch the operating mode at the vehicle; in SEMIAUTOMATIC set its speed there, too.",
-    ),
-    agv("drive-manually", &[], "Drive the vehicle by hand for a short way."),
-    agv(
-        "move-to",
-        &["nodeId"],
-        "Bring the vehicle to a node, and let it know where it is.",
-    ),
-    agv("push-out", &[], "Move the vehicle off the way it was given."),
-    agv(
-        "shift-position",
-        &[],
-        "Shift the position that the vehicle believes in aside by more than half a metre, such as with its service tool.",
-    ),
-    agv("emergency-stop", &[], "Press an emergency stop."),
-    agv(
-        "release-emergency-stop",
-        &[],
-        "Release the emergency stop, and acknowledge it.",
-    ),
-    agv(
-        "enter-field",
-        &[],
-        "Enter the protective field, or put something into it.",
-    ),
-    agv("leave-field", &[], "Leave the protective field."),
-    agv("place-obstacle", &["edgeId"], "Put an obstacle on an edge."),
-    agv("remove-obstacle", &["edgeId"], "Take the obstacle away."),
-    agv("trigger", &["actionId"], "Give the trigger that the vehicle waits for."),
-    agv(
-        "place-load",
-        &["loadType"],
-        "Put a load on the vehicle, or where it picks next.",
-    ),
-    agv(
-        "remove-load",
-        &["loadType"],
-        "Take the load off the vehicle, or away from where it picks next.",
-    ),
-    agv("press-pause", &[], "Press the pause button at the vehicle."),
-    agv("release-pause", &[], "End the pause at the vehicle."),
-    agv(
-        "block-pause",
-        &[],
-        "Make startPause and stopPause fail, e.g. by a switch.",
-    ),
-    agv("unblock-pause", &[], "Let startPause and stopPause succeed again."),
-    agv(
-        "lock-charger",
-        &[],
-        "Make stopCharging fail, e.g. by a mechanical latch.",
-    ),
-    agv("unlock-charger", &[], "Let stopCharging succeed again."),
-    agv(
-        "use-lift",
-        &["mapId"],
-        "Bring the lift with the vehicle in it to the floor of a map.",
-    ),
-    agv(
-        "enable-map",
-        &["mapId", "mapVersion"],
-        "Enable a map version at the vehicle.",
-    ),
-    agv(
-        "provoke-error",
-        &["errorLevel"],
-        "Bring about a real fault of the vehicle.",
-    ),
-    agv("clear-error", &[], "Clear the fault."),
-    agv("confirm", &["question"], "Look, and answer the question with yes."),
-    master_control(
-        "after-start",
-        &[],
-        "Give the master control what it needs before anything else, such as a login.",
-    ),
-    master_control(
-        "dispatch",
-        &["vehicle", "from", "to", "loadType", "action", "parameters"],
-        "Order a transport.",
-    ),
-    master_control(
-        "reroute",
-        &["vehicle", "to"],
-        "Give the running transport another destination.",
-    ),
-    master_control("cancel", &["vehicle"], "Call off the running transport."),
-    master_control("pause", &["vehicle"], "Tell the vehicle to pause."),
-    master_control("resume", &["vehicle"], "Tell the vehicle to go on."),
-    master_control(
-        "instant-action",
-        &["vehicle", "action"],
-        "Send an instant action to the vehicle.",
-    ),
-    master_control(
-        "request-factsheet",
-        &["vehicle"],
-        "Ask for the factsheet of the vehicle.",
-    ),
-    master_control("request-state", &["vehicle"], "Ask for the state of the vehicle."),
-    master_control(
-        "init-position",
-        &["vehicle", "nodeId", "x", "y", "theta", "mapId"],
-        "Tell the vehicle where it stands.",
-    ),
-    master_control(
-        "download-map",
-        &["vehicle", "mapId", "mapVersion", "mapDownloadLink"],
-        "Begin the roll-out of a map version to the vehicle.",
-    ),
-    master_control(
-        "enable-map",
-        &["vehicle", "mapId", "mapVersion"],
-        "Enable a map version on the vehicle.",
-    ),
-    master_control(
-        "delete-map",
-        &["vehicle", "mapId", "mapVersion"],
-        "Delete a map version from the vehicle.",
-    ),
-    master_control(
-        "block-edge",
-        &["vehicle", "from", "to"],
-        "Close a way for the vehicle in the layout.",
-    ),
-    master_control("unblock-edge", &["vehicle", "from", "to"], "Open the way again."),
-    ending(master_control(
-        "configure",
-        &["vehicle", "what"],
-        "Set the master control up for what comes next.",
-    )),
-    master_control("start", &["vehicle"], "Start the master control."),
-    ending(master_control(
-        "shutdown",
-        &["vehicle"],
-        "Shut the master control down.",
-    )),
-    master_control(
-        "confirm",
-        &["vehicle", "question"],
-        "Look, and answer the question with yes.",
-    ),
-];
-
-/// The hook of that name for that side.
-#[must_use]
-pub fn find(name: &str, role: Role) -> Option<&'static HookInfo> {
-    HOOKS.iter().find(|hook| hook.name == name && hook.role == role)
-}
-
-/// Whether the program of a device may end by a hook of that name.
-#[must_use]
-pub fn ends_the_device(name: &str) -> bool {
-    HOOKS.iter().any(|hook| hook.name == name && hook.ends)
+    text
 }
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
+    use super::super::check;
     use super::*;
+    use tck_base::diagnostic::Source;
+    use tck_pack::{Assets, Hooks};
 
     #[test]
-    fn names_are_unique_for_a_role_and_documented() {
-        for (at, hook) in HOOKS.iter().enumerate() {
-            assert!(
-                HOOKS[at + 1..]
-                    .iter()
-                    .all(|other| (other.name, other.role) != (hook.name, hook.role))
-            );
-            assert!(hook.doc.ends_with('.'), "{}", hook.name);
+    fn every_example_of_every_hook_can_stand_in_a_profile() {
+        let hooks = Hooks::load(&Assets::of_source_tree().unwrap()).unwrap();
+        for hook in hooks.all() {
+            let example = HookExample::of(hook);
+            for way in [&example.prompt, &example.run, &example.http] {
+                let role = hook.role;
+                let text = format!("[device]\nrole = \"{role}\"\n[hooks.{}]\n{way}\n", hook.name);
+                let read = check(&Source::new("device.toml", text.clone()), Path::new(""), &hooks);
+                let profile = read.unwrap_or_else(|wrong| panic!("{}\n{text}", wrong[0])).profile;
+                assert_eq!(profile.hooks[&hook.name].info.role, role);
+            }
+            let body = example.request.split_once("\n\n").map(|(_, body)| body);
+            let object: Option<serde_json::Value> = body.map(|body| serde_json::from_str(body).expect("JSON"));
+            let sent = object.map_or(0, |object| object.as_object().expect("an object").len());
+            assert_eq!(sent, hook.parameters.len(), "{}", hook.name);
         }
     }
 }

@@ -32,7 +32,7 @@ use serde_json::{Map, Value, json};
 pub use claim::Claim;
 pub use effective::Effective;
 pub use hook_action::{Hook, HookAction, NATURAL_TRAFFIC, RESTART_DEVICE, START_DEVICE, STOP_DEVICE};
-pub use hooks::{HOOKS, HookInfo, ends_the_device, find as find_hook};
+pub use hooks::HookExample;
 pub use key::{
     COMMON_PLACEHOLDERS, FOUND, KEYS, Key, Kind, PASSWORD_VARIABLE, Place, SAMPLE_ACTIONS, STATEMENTS, SampleKind,
     Statement,
@@ -45,7 +45,7 @@ pub use tck_base::secrets::{Password, Secrets};
 use tck_base::time;
 pub use tck_base::time::{Contract, TimeLimits, WILL_UNKNOWN, parse as parse_duration, show as show_duration};
 pub use tck_journal::event::Setting;
-pub use vehicle::{VEHICLE_WORDS, VehicleWord, find as find_vehicle_word};
+pub use vehicle::{VEHICLE_WORDS, VehicleEffect, VehicleWord, find as find_vehicle_word};
 
 use tck_base::diagnostic::Span;
 use tck_pack::{RequirementId, Role};

@@ -10,6 +10,7 @@ use super::surroundings::Surroundings;
 use super::value::Value;
 use super::{DEFAULT_TOML, read};
 use tck_base::diagnostic::{self, Diagnostic, Source};
+use tck_pack::Hooks;
 
 /// Variables that belong to flags which are no settings of a device.
 const OTHER_VARIABLES: [&str; 7] = [
@@ -94,7 +95,7 @@ fn given(key: &Key, text: &str, folder: &Path, origin: &Origin, what: &str) -> R
     }
 }
 
-fn file(path: &Path) -> Result<Layer, Vec<Diagnostic>> {
+fn file(path: &Path, hooks: &Hooks) -> Result<Layer, Vec<Diagnostic>> {
     let name = path.display().to_string();
     let text = std::fs::read_to_string(path).map_err(|error| {
         let diagnostic = Diagnostic::whole("unreadable", format!("the profile {name} cannot be read: {error}"));
@@ -104,15 +105,20 @@ fn file(path: &Path) -> Result<Layer, Vec<Diagnostic>> {
         ]
     })?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    read::read(&Source::new(name.clone(), text), folder, Origin::File(name))
+    read::read(&Source::new(name.clone(), text), folder, Origin::File(name), hooks)
 }
 
-fn defaults() -> Result<Layer, Vec<Diagnostic>> {
-    read::read(&Source::new("defaults", DEFAULT_TOML), Path::new(""), Origin::Default)
+fn defaults(hooks: &Hooks) -> Result<Layer, Vec<Diagnostic>> {
+    read::read(
+        &Source::new("defaults", DEFAULT_TOML),
+        Path::new(""),
+        Origin::Default,
+        hooks,
+    )
 }
 
 /// The effective profile: `flags` (name of the setting and text) over environment, profile, project file,
-/// user file and defaults.
+/// user file and defaults. A hook in it is one of `hooks`.
 ///
 /// # Errors
 /// Every mistake in any of them.
@@ -120,6 +126,7 @@ pub fn load(
     profile: Option<&Path>,
     flags: &[(&'static str, String)],
     surroundings: &Surroundings,
+    hooks: &Hooks,
 ) -> Result<Effective, Vec<Diagnostic>> {
     let mut from_flags = Layer::default();
     let mut wrong = Vec::new();
@@ -147,8 +154,8 @@ pub fn load(
         surroundings.project_file(),
         profile.map(Path::to_path_buf),
     ];
-    let layers = std::iter::once(defaults())
-        .chain(files.into_iter().flatten().map(|path| file(&path)))
+    let layers = std::iter::once(defaults(hooks))
+        .chain(files.into_iter().flatten().map(|path| file(&path, hooks)))
         .chain([surroundings.layer(), Ok(from_flags)]);
     let mut merged = Layer::default();
     for layer in layers {
@@ -158,7 +165,7 @@ pub fn load(
         }
     }
     if wrong.is_empty() {
-        effective(&merged.fit_defaults())
+        effective(&merged.fit_defaults(), hooks)
     } else {
         Err(wrong)
     }
@@ -168,7 +175,7 @@ pub fn load(
 ///
 /// # Errors
 /// Every mistake in it.
-pub fn check(source: &Arc<Source>, folder: &Path) -> Result<Effective, Vec<Diagnostic>> {
-    let layer = read::read(source, folder, Origin::File(source.name.clone()))?;
-    effective(&defaults()?.under(layer).fit_defaults())
+pub fn check(source: &Arc<Source>, folder: &Path, hooks: &Hooks) -> Result<Effective, Vec<Diagnostic>> {
+    let layer = read::read(source, folder, Origin::File(source.name.clone()), hooks)?;
+    effective(&defaults(hooks)?.under(layer).fit_defaults(), hooks)
 }

@@ -1,10 +1,12 @@
 //! What a profile as a whole has to hold.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use super::*;
 use tck_base::diagnostic::{Diagnostic, Source};
+use tck_pack::{Assets, Hooks};
 
 fn fixtures(which: &str) -> Vec<PathBuf> {
     let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
@@ -22,11 +24,16 @@ fn fixtures(which: &str) -> Vec<PathBuf> {
 fn checked(path: &Path) -> Result<Effective, Vec<Diagnostic>> {
     let text = std::fs::read_to_string(path).expect("fixture");
     let name = path.file_name().expect("name").to_string_lossy();
-    check(&Source::new(name, text), Path::new("site"))
+    check(&Source::new(name, text), Path::new("site"), hooks())
 }
 
 fn check_text(text: &str) -> Result<Effective, Vec<Diagnostic>> {
-    check(&Source::new("device.toml", text), Path::new("site"))
+    check(&Source::new("device.toml", text), Path::new("site"), hooks())
+}
+
+fn hooks() -> &'static Hooks {
+    static HOOKS: LazyLock<Hooks> = LazyLock::new(|| Hooks::load(&Assets::of_source_tree().unwrap()).unwrap());
+    &HOOKS
 }
 
 fn setting<'a>(effective: &'a Effective, name: &str) -> Option<(&'a str, &'a str)> {
@@ -159,11 +166,12 @@ fn the_schema_for_editors_refuses_what_a_schema_can_refuse() {
         "slow-after-react",
         "statements-contradict",
     ];
-    const ALSO_BEYOND: [&str; 7] = [
+    const ALSO_BEYOND: [&str; 8] = [
         "action-claimed",
         "action-claimed-absent",
         "hook-header",
         "hook-listen-and-timeout",
+        "hook-unknown",
         "no-tap-no-broker",
         "topic-template-placeholder",
         "vehicle-type-of-nothing",
@@ -200,15 +208,11 @@ fn the_schema_for_editors_knows_the_same_names_as_the_reader() {
     in_reader.sort();
     assert_eq!(in_schema, in_reader);
 
-    let hooks = schema["properties"]["hooks"]["propertyNames"]["enum"]
-        .as_array()
-        .expect("names");
-    let mut in_schema: Vec<&str> = hooks.iter().filter_map(Value::as_str).collect();
-    in_schema.sort_unstable();
-    let mut in_reader: Vec<&str> = HOOKS.iter().map(|hook| hook.name).collect();
-    in_reader.sort_unstable();
-    in_reader.dedup();
-    assert_eq!(in_schema, in_reader);
+    let names = &schema["properties"]["hooks"]["propertyNames"]["anyOf"][0]["enum"];
+    let names = names.as_array().expect("names").iter().filter_map(Value::as_str);
+    let in_schema: BTreeSet<&str> = names.collect();
+    let in_vocabulary: BTreeSet<&str> = hooks().all().map(|hook| hook.name.as_str()).collect();
+    assert_eq!(in_schema, in_vocabulary);
 }
 
 #[test]
@@ -346,7 +350,7 @@ fn flag_beats_environment_beats_profile_beats_project_beats_user_beats_default()
     let user = site.write("config/vda5050-tck/config.toml", "[bench]\nlisten = \"u:1\"\n");
     let origin = |path: &Path| path.display().to_string();
     let listen = |site: &Site, profile: Option<&Path>, flags: &[(&'static str, String)]| {
-        let effective = load(profile, flags, &site.surroundings).expect("effective");
+        let effective = load(profile, flags, &site.surroundings, hooks()).expect("effective");
         let (value, origin) = setting(&effective, "bench.listen").expect("set");
         (value.to_owned(), origin.to_owned())
     };
@@ -383,7 +387,7 @@ fn the_other_way_of_saying_a_thing_is_replaced_by_the_layer_above() {
         "device.toml",
         "[bench]\npassword-env = \"P\"\n[layout]\nnodes = [{ id = \"n\", x = 0, y = 0, map = \"m\" }]\n",
     );
-    let effective = load(Some(&profile), &[], &site.surroundings).expect("no contradiction");
+    let effective = load(Some(&profile), &[], &site.surroundings, hooks()).expect("no contradiction");
     assert!(matches!(effective.profile.layout.source, LayoutSource::List(_)));
     assert_eq!(
         effective.profile.bench.password,
@@ -402,7 +406,7 @@ fn hooks_and_deviations_of_two_layers_add_up() {
         "device.toml",
         "[deviations]\nMQTT-04 = \"new\"\n[hooks.shutdown]\nprompt = \"stop it\"\n",
     );
-    let profile = load(Some(&profile), &[], &site.surroundings)
+    let profile = load(Some(&profile), &[], &site.surroundings, hooks())
         .expect("effective")
         .profile;
     assert_eq!(profile.hooks.keys().collect::<Vec<_>>(), ["shutdown", "start"]);
@@ -415,7 +419,7 @@ fn a_variable_that_sets_nothing_is_refused_with_the_one_that_was_meant() {
     let mut site = Site::new();
     let variable = ("VDA5050_TCK_BENCH_LISTN".to_owned(), "e:1".to_owned());
     site.surroundings.environment.extend([variable]);
-    let wrong = load(None, &[], &site.surroundings).expect_err("a slip");
+    let wrong = load(None, &[], &site.surroundings, hooks()).expect_err("a slip");
     assert_eq!(
         wrong[0].hint.as_deref(),
         Some("did you mean `VDA5050_TCK_BENCH_LISTEN`?")
@@ -427,7 +431,7 @@ fn a_variable_set_to_nothing_is_not_set() {
     let mut site = Site::new();
     let variable = ("VDA5050_TCK_DEVICE_MANUFACTURER".to_owned(), String::new());
     site.surroundings.environment.extend([variable]);
-    let effective = load(None, &[], &site.surroundings).expect("effective");
+    let effective = load(None, &[], &site.surroundings, hooks()).expect("effective");
     assert_eq!(effective.profile.device.manufacturer, None);
 }
 
@@ -435,7 +439,13 @@ fn a_variable_set_to_nothing_is_not_set() {
 fn a_bad_flag_and_a_missing_profile_are_both_named() {
     let site = Site::new();
     let flags = [("bench.broker", "mqtt://me:secret@host".to_owned())];
-    let wrong = load(Some(Path::new("/nowhere/device.toml")), &flags, &site.surroundings).expect_err("two mistakes");
+    let wrong = load(
+        Some(Path::new("/nowhere/device.toml")),
+        &flags,
+        &site.surroundings,
+        hooks(),
+    )
+    .expect_err("two mistakes");
     assert_eq!(
         wrong.iter().map(|diagnostic| diagnostic.code).collect::<Vec<_>>(),
         ["credentials", "unreadable"]

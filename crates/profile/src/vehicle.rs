@@ -2,6 +2,8 @@
 //!
 //! [`VEHICLE_WORDS`] is the one set of names; the reference AGV knows exactly these.
 
+use VehicleEffect::{ComesOrGoes, Deviates, Moves};
+
 /// A word a test may say to a mock vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VehicleWord {
@@ -11,52 +13,109 @@ pub struct VehicleWord {
     pub parameters: &'static [&'static str],
     /// What the vehicle does from then on.
     pub doc: &'static str,
+    /// What follows for those who judge how it is commanded.
+    pub effects: &'static [VehicleEffect],
+}
+
+/// What follows from a word for those who judge what a master control makes of the vehicle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VehicleEffect {
+    /// It is moved, restarted or relieved of its order: the master control has to find its bearings again.
+    Moves,
+    /// Its states or its answers are less than the truth.
+    Deviates,
+    /// It leaves or comes back.
+    ComesOrGoes,
+}
+
+impl VehicleWord {
+    /// Whether this follows from it.
+    #[must_use]
+    pub fn has(&self, effect: VehicleEffect) -> bool {
+        self.effects.contains(&effect)
+    }
 }
 
 const fn word(name: &'static str, parameters: &'static [&'static str], doc: &'static str) -> VehicleWord {
-    VehicleWord { name, parameters, doc }
+    VehicleWord {
+        name,
+        parameters,
+        doc,
+        effects: &[],
+    }
+}
+
+const fn that(effects: &'static [VehicleEffect], word: VehicleWord) -> VehicleWord {
+    VehicleWord { effects, ..word }
 }
 
 /// Every word there is: first what people do at a vehicle, then how it may deviate.
 pub const VEHICLE_WORDS: &[VehicleWord] = &[
-    word(
-        "reset",
-        &["nodeId"],
-        "It is as new from the factory and stands on the node, or where it started; a vehicle that is connected stays connected.",
+    that(
+        &[Moves],
+        word(
+            "reset",
+            &["nodeId"],
+            "It is as new from the factory and stands on the node, or where it started; a vehicle that is connected stays connected.",
+        ),
     ),
-    word("power-cycle", &[], "It is switched off hard and on again."),
-    word("shutdown", &[], "It ends its connection in good order and stays away."),
-    word("start", &[], "It connects after a shutdown or a break-off."),
-    word(
-        "break-off",
-        &[],
-        "Its connection is lost without a farewell, the broker publishes its last will, and it stays away until `start`; it drives on meanwhile.",
+    that(
+        &[Moves],
+        word("power-cycle", &[], "It is switched off hard and on again."),
     ),
-    word(
-        "stale-will",
-        &[],
-        "From its next connection on its last will is old: headerId 0 and a timestamp from long ago.",
+    that(
+        &[Moves, ComesOrGoes],
+        word("shutdown", &[], "It ends its connection in good order and stays away."),
     ),
-    word("set-mode", &["mode"], "Its operating mode is switched."),
-    word(
-        "place-on",
-        &["nodeId"],
-        "It is put on a node and knows where it is; an order is given up.",
+    that(
+        &[Moves, ComesOrGoes],
+        word("start", &[], "It connects after a shutdown or a break-off."),
     ),
-    word(
-        "move-to",
-        &["nodeId", "x", "y", "theta"],
-        "It is brought to a place by hand, which takes a mode for people.",
+    that(
+        &[Moves, ComesOrGoes],
+        word(
+            "break-off",
+            &[],
+            "Its connection is lost without a farewell, the broker publishes its last will, and it stays away until `start`; it drives on meanwhile.",
+        ),
     ),
-    word("push-out", &[], "It is moved off the way it was given."),
+    that(
+        &[Deviates],
+        word(
+            "stale-will",
+            &[],
+            "From its next connection on its last will is old: headerId 0 and a timestamp from long ago.",
+        ),
+    ),
+    that(&[Moves], word("set-mode", &["mode"], "Its operating mode is switched.")),
+    that(
+        &[Moves],
+        word(
+            "place-on",
+            &["nodeId"],
+            "It is put on a node and knows where it is; an order is given up.",
+        ),
+    ),
+    that(
+        &[Moves],
+        word(
+            "move-to",
+            &["nodeId", "x", "y", "theta"],
+            "It is brought to a place by hand, which takes a mode for people.",
+        ),
+    ),
+    that(&[Moves], word("push-out", &[], "It is moved off the way it was given.")),
     word(
         "shift-position",
         &["by"],
         "It takes itself to stand beside the way it was given, by that many metres.",
     ),
-    word("drive-manually", &[], "It is driven by hand for a short way."),
-    word("lose-position", &[], "It no longer knows where it is."),
-    word("find-position", &[], "It knows where it is again."),
+    that(
+        &[Moves],
+        word("drive-manually", &[], "It is driven by hand for a short way."),
+    ),
+    that(&[Moves], word("lose-position", &[], "It no longer knows where it is.")),
+    that(&[Moves], word("find-position", &[], "It knows where it is again.")),
     word("halt", &[], "It stops where it is, as in traffic."),
     word(
         "stop-before",
@@ -97,10 +156,13 @@ pub const VEHICLE_WORDS: &[VehicleWord] = &[
     word("place-load", &["loadId", "loadType"], "A load is put on it."),
     word("remove-load", &[], "Its loads are taken off."),
     word("trigger", &["actionId"], "The trigger it waits for is given."),
-    word(
-        "use-lift",
-        &["mapId"],
-        "The lift with the vehicle in it is brought to another floor.",
+    that(
+        &[Moves],
+        word(
+            "use-lift",
+            &["mapId"],
+            "The lift with the vehicle in it is brought to another floor.",
+        ),
     ),
     word(
         "enable-map",
@@ -117,32 +179,53 @@ pub const VEHICLE_WORDS: &[VehicleWord] = &[
         &["on"],
         "Its states ask for a longer base, or no longer do.",
     ),
-    word("answer-after", &["seconds"], "It takes messages only after that time."),
-    word(
-        "state-interval",
-        &["seconds"],
-        "It leaves at least that time between two states.",
+    that(
+        &[Deviates],
+        word("answer-after", &["seconds"], "It takes messages only after that time."),
     ),
-    word(
-        "lose-states",
-        &["count"],
-        "Its next states are lost on the way, as many as said.",
+    that(
+        &[Deviates],
+        word(
+            "state-interval",
+            &["seconds"],
+            "It leaves at least that time between two states.",
+        ),
     ),
-    word("stay-silent", &[], "It publishes no state, though it is connected."),
-    word(
-        "ignore-orders",
-        &["count"],
-        "It ignores the next orders silently; all of them unless said.",
+    that(
+        &[Deviates],
+        word(
+            "lose-states",
+            &["count"],
+            "Its next states are lost on the way, as many as said.",
+        ),
     ),
-    word(
-        "reject-orders",
-        &["errorType", "count", "references"],
-        "It rejects new orders with this error; all of them unless said.",
+    that(
+        &[Deviates],
+        word("stay-silent", &[], "It publishes no state, though it is connected."),
     ),
-    word(
-        "reject-updates",
-        &["errorType", "count", "references"],
-        "It rejects updates of its order with this error; all of them unless said.",
+    that(
+        &[Deviates],
+        word(
+            "ignore-orders",
+            &["count"],
+            "It ignores the next orders silently; all of them unless said.",
+        ),
+    ),
+    that(
+        &[Deviates],
+        word(
+            "reject-orders",
+            &["errorType", "count", "references"],
+            "It rejects new orders with this error; all of them unless said.",
+        ),
+    ),
+    that(
+        &[Deviates],
+        word(
+            "reject-updates",
+            &["errorType", "count", "references"],
+            "It rejects updates of its order with this error; all of them unless said.",
+        ),
     ),
     word(
         "hold-cancel",
@@ -164,27 +247,39 @@ pub const VEHICLE_WORDS: &[VehicleWord] = &[
         &["factsheet"],
         "Its factsheet is published with this merge patch laid over, and it goes by the limits there; an empty one restores it.",
     ),
-    word(
-        "show",
-        &["state"],
-        "Its states are published with this merge patch laid over; an empty one ends it.",
+    that(
+        &[Deviates],
+        word(
+            "show",
+            &["state"],
+            "Its states are published with this merge patch laid over; an empty one ends it.",
+        ),
     ),
     word(
         "show-visualization",
         &["visualization"],
         "Its visualization messages are published with this merge patch laid over; an empty one ends it.",
     ),
-    word(
-        "publish",
-        &["topic", "payload", "text"],
-        "It publishes a payload once on its own topic: an object is completed with a header, a text goes out as it is.",
+    that(
+        &[Deviates],
+        word(
+            "publish",
+            &["topic", "payload", "text"],
+            "It publishes a payload once on its own topic: an object is completed with a header, a text goes out as it is.",
+        ),
     ),
-    word(
-        "speak-version",
-        &["version"],
-        "The header of all its messages names this version.",
+    that(
+        &[Deviates],
+        word(
+            "speak-version",
+            &["version"],
+            "The header of all its messages names this version.",
+        ),
     ),
-    word("well-behaved", &[], "All deviations end; its order and its place stay."),
+    that(
+        &[Moves],
+        word("well-behaved", &[], "All deviations end; its order and its place stay."),
+    ),
 ];
 
 /// The word of that name.

@@ -8,12 +8,8 @@ use tck_engine::{EngineError, HookOutcome, Operator, Recorder};
 use tck_journal::Vantage;
 use tck_journal::event::{Event, LinkFault};
 use tck_net::link::Link;
+use tck_pack::{HookEffect, HookInfo};
 use tck_profile::show_duration;
-
-/// The hook that gives the device what it needs after a start.
-const AFTER_START: &str = "after-start";
-/// The hooks after which the device has just been started.
-const STARTS_IT: [&str; 2] = ["power-cycle", "start"];
 
 /// So often a device is switched on before it is given up.
 const STARTS: usize = 2;
@@ -36,12 +32,12 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         Ok(())
     }
 
-    /// Waits for a device that is gone, with the help of the `power-cycle` hook if there is one. Gives the
+    /// Waits for a device that is gone, with the help of the hook that switches it off and on if there is one. Gives the
     /// reason when it stays away.
     pub(super) async fn revive(&mut self) -> Result<Option<String>, EngineError> {
         let vantage = self.setup.capabilities.vantage;
         let there = move |recorder: &Recorder| Presence::of(recorder.judge(), vantage).is_there();
-        let has_hook = self.engine.operator.hooks().iter().any(|hook| hook == "power-cycle");
+        let has_hook = self.engine.hook_that(HookEffect::PowerCycles).is_some();
         // A device that comes back by itself is given the chance before it is switched off and on.
         let first = if has_hook {
             self.time("settle")
@@ -78,26 +74,25 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
 impl<L: Link, O: Operator> Session<'_, L, O> {
     /// Lets the device have what it needs after a start. `Err` says what did not work.
     pub(super) async fn after_start(&mut self) -> Result<Result<(), String>, EngineError> {
-        let has_hook = self.engine.operator.hooks().iter().any(|hook| hook == AFTER_START);
         self.ready_since = next_seq(&self.engine.recorder);
-        if !has_hook {
+        let Some(hook) = self.engine.hook_that(HookEffect::PreparesAfterStart) else {
             return Ok(Ok(()));
-        }
-        Ok(match self.engine.hook(AFTER_START, Map::new(), true).await? {
+        };
+        Ok(match self.engine.hook(&hook, Map::new(), true).await? {
             HookOutcome::Done(_) | HookOutcome::Missing => Ok(()),
             HookOutcome::Failed(why) | HookOutcome::Refused(why) | HookOutcome::Skipped(why) => {
-                Err(format!("hook `{AFTER_START}` failed: {why}"))
+                Err(format!("hook `{hook}` failed: {why}"))
             }
         })
     }
 
     /// Whether a test has started the device since it was last given what it needs after a start.
     pub(super) fn was_started(&self) -> bool {
+        let ground = self.engine.recorder.judge().ground();
+        let starts = |hook: &str| ground.hooks.find(hook, ground.role).is_some_and(HookInfo::starts);
         let entries = self.engine.recorder.journal().entries().iter().rev();
         let mut since = entries.take_while(|entry| entry.seq() >= self.ready_since);
-        since.any(
-            |entry| matches!(entry.event(), Event::Hook { hook, ok: true, .. } if STARTS_IT.contains(&hook.as_str())),
-        )
+        since.any(|entry| matches!(entry.event(), Event::Hook { hook, ok: true, .. } if starts(hook)))
     }
 }
 
@@ -130,12 +125,15 @@ pub(super) async fn power_cycle<L: Link, O: Operator>(
 async fn off_and_on<L: Link, O: Operator>(session: &mut Session<'_, L, O>) -> Result<Result<(), String>, EngineError> {
     let vantage = session.setup.capabilities.vantage;
     let before = next_seq(&session.engine.recorder);
-    match session.engine.hook("power-cycle", Map::new(), true).await? {
+    let Some(hook) = session.engine.hook_that(HookEffect::PowerCycles) else {
+        return Ok(Err("there is no hook that switches it off and on".to_owned()));
+    };
+    match session.engine.hook(&hook, Map::new(), true).await? {
         HookOutcome::Done(_) => {}
         HookOutcome::Failed(failed) | HookOutcome::Refused(failed) | HookOutcome::Skipped(failed) => {
-            return Ok(Err(format!("hook `power-cycle` failed: {failed}")));
+            return Ok(Err(format!("hook `{hook}` failed: {failed}")));
         }
-        HookOutcome::Missing => return Ok(Err("there is no hook `power-cycle`".to_owned())),
+        HookOutcome::Missing => return Ok(Err(format!("there is no hook `{hook}`"))),
     }
     let after = next_seq(&session.engine.recorder);
     let on_again = move |recorder: &Recorder| match vantage {
@@ -162,7 +160,7 @@ async fn off_and_on<L: Link, O: Operator>(session: &mut Session<'_, L, O>) -> Re
     let is_over = |recorder: &Recorder| is_down(recorder) || back(recorder);
     let came = session.engine.watch(begun + patience, is_over).await?;
     if let Some(why) = session.program_is_down() {
-        return Ok(Err(format!("after hook `power-cycle` {why}")));
+        return Ok(Err(format!("after hook `{hook}` {why}")));
     }
     if came {
         return Ok(Ok(()));
@@ -183,7 +181,7 @@ async fn off_and_on<L: Link, O: Operator>(session: &mut Session<'_, L, O>) -> Re
         "it did not come back"
     };
     Ok(Err(format!(
-        "{missing} within {} after hook `power-cycle`",
+        "{missing} within {} after hook `{hook}`",
         show_duration(waited)
     )))
 }

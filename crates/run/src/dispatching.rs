@@ -1,7 +1,7 @@
 //! A master control under test: what happens before the first test and between two of them.
 //!
 //! The mock AGVs are the harness's own, so they can be put back by hand. What the master control still wants of them
-//! is called off first, by its hook `cancel` if there is one.
+//! is called off first, if it has a hook for that.
 
 use std::sync::Arc;
 
@@ -13,6 +13,7 @@ use tck_engine::vehicle::is_idle;
 use tck_engine::{EngineError, Operator, Recorder};
 use tck_journal::event::Event;
 use tck_net::link::Link;
+use tck_pack::HookEffect;
 use tck_simulate::Fleet;
 use tck_suite::model::Test;
 use tck_view::StateView;
@@ -43,24 +44,25 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
     /// Puts the mock AGVs back: no order, no persona, everything as it was, where they stand.
     pub(super) async fn tidy_fleet(&mut self, test: &Test) -> Result<(), EngineError> {
         let idle = |recorder: &Recorder| is_idle(recorder.judge());
-        if !idle(&self.engine.recorder) && !self.engine.interrupted() {
-            let has_hook = self.engine.operator.hooks().iter().any(|hook| hook == "cancel");
-            if has_hook {
-                let text = format!(
-                    "after test {} the vehicle still has an order; it is called off",
-                    test.id
-                );
-                self.engine.note(Event::Note { text })?;
-                // A vehicle that is told to be awkward cannot be called back.
-                for vehicle in 0..self.setup.vehicles {
-                    self.engine
-                        .set_vehicle(vehicle, "well-behaved", Map::new().into())
-                        .await?;
-                }
-                self.engine.hook("cancel", self.first_vehicle(), true).await?;
-                let until = self.engine.link.now().moment + self.time("slow") + self.time("drive");
-                self.engine.watch(until, idle).await?;
+        let calls_off = self.engine.hook_that(HookEffect::CallsOff);
+        if let Some(hook) = calls_off
+            && !idle(&self.engine.recorder)
+            && !self.engine.interrupted()
+        {
+            let text = format!(
+                "after test {} the vehicle still has an order; it is called off",
+                test.id
+            );
+            self.engine.note(Event::Note { text })?;
+            // A vehicle that is told to be awkward cannot be called back.
+            for vehicle in 0..self.setup.vehicles {
+                self.engine
+                    .set_vehicle(vehicle, "well-behaved", Map::new().into())
+                    .await?;
             }
+            self.engine.hook(&hook, self.first_vehicle(), true).await?;
+            let until = self.engine.link.now().moment + self.time("slow") + self.time("drive");
+            self.engine.watch(until, idle).await?;
         }
         for vehicle in 0..self.setup.vehicles.min(2) {
             if self.is_as_it_was(vehicle) {
@@ -86,7 +88,8 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
     /// `vehicle-ready`).
     pub(super) async fn let_it_finish(&mut self) -> Result<(), EngineError> {
         // Left to its natural traffic, it may never be without an order.
-        if self.engine.operator.natural_traffic("dispatch").is_some() {
+        let dispatch = self.engine.hook_that(HookEffect::OrdersTransport);
+        if dispatch.is_some_and(|hook| self.engine.operator.natural_traffic(&hook).is_some()) {
             return Ok(());
         }
         for _ in 0..LEFTOVERS {

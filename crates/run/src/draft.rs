@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 
 use super::discover::Device;
 use super::sheet::Sheet;
-use tck_pack::{Packs, Role};
-use tck_profile::{HOOKS, SAMPLE_ACTIONS};
+use tck_pack::{Hooks, Packs, Role};
+use tck_profile::SAMPLE_ACTIONS;
 
 /// What the person who asks for the profile says beside it.
 #[derive(Clone, Debug, Default)]
@@ -27,7 +27,7 @@ pub struct Wishes {
 
 /// The text of `device.toml`.
 #[must_use]
-pub fn draft(device: &Device, wishes: &Wishes, packs: &Packs) -> String {
+pub fn draft(device: &Device, wishes: &Wishes, packs: &Packs, known: &Hooks) -> String {
     let mut text = String::new();
     let name = format!("{} {}", device.manufacturer, device.serial_number);
     let _ = writeln!(
@@ -44,7 +44,7 @@ pub fn draft(device: &Device, wishes: &Wishes, packs: &Packs) -> String {
     );
     text.push_str("# max-speed = 0.5\n");
     layout(device, wishes, &mut text);
-    hooks(device.sheet(packs).as_ref(), &mut text);
+    hooks(device.sheet(packs).as_ref(), known, &mut text);
     text
 }
 
@@ -157,19 +157,14 @@ fn layout(device: &Device, wishes: &Wishes, text: &mut String) {
 }
 
 /// The hooks that make sense for what the device can do.
-fn hooks(sheet: Option<&Sheet>, text: &mut String) {
+fn hooks(sheet: Option<&Sheet>, known: &Hooks, text: &mut String) {
     text.push_str("\n# What people or machines do to the device when a test asks for it. Exactly one of `run`, `http` and `prompt`.\n");
-    for hook in HOOKS.iter().filter(|hook| hook.role == Role::Agv) {
-        let needs = match hook.name {
-            "place-load" | "remove-load" => "pick",
-            "enable-map" => "enableMap",
-            "block-charging" | "unblock-charging" => "startCharging",
-            _ => "",
-        };
-        if !needs.is_empty() && sheet.is_some_and(|sheet| !has_action(sheet, needs)) {
+    for hook in known.of(Role::Agv) {
+        let needs = hook.for_action.as_deref();
+        if needs.is_some_and(|action| sheet.is_some_and(|sheet| !has_action(sheet, action))) {
             continue;
         }
-        let _ = writeln!(text, "\n# {}", one_line(hook.doc));
+        let _ = writeln!(text, "\n# {}", one_line(&hook.doc));
         let _ = writeln!(text, "# [hooks.{}]\n# prompt = \"…\"", hook.name);
     }
 }
@@ -232,8 +227,12 @@ mod tests {
                 broker: "mqtt://127.0.0.1:1883".to_owned(),
                 ..Wishes::default()
             };
-            let text = draft(&device, &wishes, packs);
-            let read = tck_profile::check(&Source::new("device.toml", text.clone()), std::path::Path::new(""));
+            let text = draft(&device, &wishes, packs, &library.rules.hooks);
+            let read = tck_profile::check(
+                &Source::new("device.toml", text.clone()),
+                std::path::Path::new(""),
+                &library.rules.hooks,
+            );
             let profile = read.unwrap_or_else(|wrong| panic!("{}\n{text}", wrong[0])).profile;
             assert!(!profile.motion.allowed);
             assert_eq!(profile.device.serial_number.as_deref(), Some(one_line(serial).as_str()));
@@ -241,6 +240,8 @@ mod tests {
                 text.contains("# pick = ") && !text.contains("# start-charging = "),
                 "{text}"
             );
+            // A vehicle that cannot charge has no charger that could be locked.
+            assert!(text.contains("[hooks.place-load]") && !text.contains("[hooks.lock-charger]"));
         }
     }
 }

@@ -13,11 +13,12 @@ use super::person::{Answer, Person, ask};
 use super::program::program;
 use tck_engine::{HookOutcome, Operator};
 use tck_net::bench::web;
-use tck_profile::{Hook, HookAction, Secrets, ends_the_device, show_duration};
+use tck_pack::HookInfo;
+use tck_profile::{Hook, HookAction, Secrets, show_duration};
 
 /// Answers of a device that has understood what is wanted, and does not do it: in conflict with what it does now, not
 /// to be processed, not implemented.
-const REFUSALS: [u16; 3] = [409, 422, 501];
+pub const REFUSALS: [u16; 3] = [409, 422, 501];
 
 /// The hooks of a profile.
 #[derive(Debug)]
@@ -155,8 +156,11 @@ impl Operator for ProfileHooks {
             Value::String(text) => (name, text),
             other => (name, other.to_string()),
         }));
+        if matches!(hook.action, HookAction::Prompt(_)) {
+            in_words(&hook.info, &mut values);
+        }
         // However it is done: a device that a hook ends does not end by itself.
-        let ends = ends_the_device(name);
+        let ends = hook.info.may_end_the_device();
         if let (true, Some(device)) = (ends, &mut self.device) {
             device.is_asked(&format!("hook `{name}`"), hook.timeout).await;
         }
@@ -171,6 +175,19 @@ impl Operator for ProfileHooks {
             HookOutcome::Refused(text) => HookOutcome::Refused(shown(text)),
             HookOutcome::Skipped(text) => HookOutcome::Skipped(shown(text)),
             HookOutcome::Missing => HookOutcome::Missing,
+        }
+    }
+}
+
+/// A person is told what a value means; programs are given the identifier.
+fn in_words(hook: &HookInfo, values: &mut BTreeMap<String, String>) {
+    for parameter in &hook.parameters {
+        let Some(given) = values.get_mut(&parameter.name) else {
+            continue;
+        };
+        let meant = parameter.values.iter().find(|value| value.id == *given);
+        if let Some(text) = meant.and_then(|value| value.text.as_ref()) {
+            given.clone_from(text);
         }
     }
 }
@@ -238,10 +255,24 @@ mod tests {
     use super::*;
     use crate::device::Surroundings;
     use tck_base::diagnostic::{Source, Span};
+    use tck_pack::Role;
+
+    fn known(name: &str, role: Role) -> HookInfo {
+        tck_testing::library().rules.hooks.find(name, role).unwrap().clone()
+    }
+
+    #[test]
+    fn a_person_is_told_what_a_value_means() {
+        let configure = known("configure", Role::MasterControl);
+        let mut values = BTreeMap::from([("what".to_owned(), "trigger-timeout".to_owned())]);
+        in_words(&configure, &mut values);
+        assert_eq!(values["what"], "waitForTrigger is called off after 30 s");
+    }
 
     fn hook(action: HookAction) -> Hook {
         Hook {
             name: "shutdown".to_owned(),
+            info: known("shutdown", Role::Agv),
             action,
             timeout: Duration::from_secs(30),
             span: Span::new(&Source::new("device.toml", ""), 0, 0),

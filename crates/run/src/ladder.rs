@@ -1,6 +1,6 @@
 //! The way back to rest after a test: each rung is tried only when the one before did not help, and each is recorded.
 
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use super::between::power_cycle;
 use super::lasting::{self, Idle, has_ended, is_stalled, lasting};
@@ -11,6 +11,7 @@ use tck_engine::{EngineError, Operator};
 use tck_journal::event::Event;
 use tck_judge::RunJudge;
 use tck_net::link::Link;
+use tck_pack::HookEffect;
 
 /// Whether no state has named the last order that was sent since then, although states came.
 fn last_order_never_showed(judge: &RunJudge, since: Moment) -> bool {
@@ -55,8 +56,9 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         Ok(())
     }
 
-    fn has_hook(&self, name: &str) -> bool {
-        self.engine.operator.hooks().iter().any(|hook| hook == name)
+    /// Whether the device can be switched off and on.
+    fn can_restart(&self) -> bool {
+        self.engine.hook_that(HookEffect::PowerCycles).is_some()
     }
 
     /// Brings the vehicle to rest, and gives what is still in the way.
@@ -72,7 +74,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         self.by_hand().await?;
         self.by_message().await?;
         self.read_over(self.engine.link.now().moment).await?;
-        if !self.obstacles().is_empty() && self.has_hook("power-cycle") && !self.engine.interrupted() {
+        if !self.obstacles().is_empty() && self.can_restart() && !self.engine.interrupted() {
             self.restart().await?;
         }
         let left = self.obstacles();
@@ -80,6 +82,17 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             self.ladders = 0;
         }
         Ok(left)
+    }
+
+    /// Has the hook with this effect done, with the value of its parameter, if it takes one. `false` without such a hook.
+    async fn have_done(&mut self, effect: HookEffect, value: Value) -> Result<bool, EngineError> {
+        let Some(hook) = self.engine.hook_that(effect) else {
+            return Ok(false);
+        };
+        self.rung(&format!("hook `{hook}`"))?;
+        let with = effect.parameter().map(|name| (name.to_owned(), value));
+        self.engine.hook(&hook, with.into_iter().collect(), true).await?;
+        Ok(true)
     }
 
     /// What was done to the vehicle by hand is undone by hand.
@@ -93,19 +106,16 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
                 .pack
                 .word("operatingMode.automatic");
             let automatic = automatic.unwrap_or("AUTOMATIC").to_owned();
-            let (hook, with) = match obstacle {
-                Obstacle::EmergencyStop => ("release-emergency-stop", Map::new()),
-                Obstacle::Mode(_) => ("set-mode", Map::from_iter([("mode".to_owned(), automatic.into())])),
-                Obstacle::Paused => ("release-pause", Map::new()),
-                Obstacle::Fatal(_) => ("clear-error", Map::new()),
+            let (effect, value) = match obstacle {
+                Obstacle::EmergencyStop => (HookEffect::ReleasesEmergencyStop, Value::Null),
+                Obstacle::Mode(_) => (HookEffect::SetsMode, automatic.into()),
+                Obstacle::Paused => (HookEffect::ReleasesPause, Value::Null),
+                Obstacle::Fatal(_) => (HookEffect::ClearsErrors, Value::Null),
                 _ => continue,
             };
-            if self.has_hook(hook) && !self.engine.interrupted() {
-                self.rung(&format!("hook `{hook}`"))?;
-                self.engine.hook(hook, with, true).await?;
-                if self.rests_within(self.time("settle")).await? {
-                    return Ok(());
-                }
+            let is_done = !self.engine.interrupted() && self.have_done(effect, value).await?;
+            if is_done && self.rests_within(self.time("settle")).await? {
+                return Ok(());
             }
         }
         Ok(())
@@ -132,7 +142,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             // nothing at all any more has not disobeyed.
             let states = self.engine.recorder.judge().timeline().of("state");
             let silent = states.last().is_none_or(|entry| entry.at().moment < since);
-            self.engine.cancels = cancelled || silent || !is_busy(&self.obstacles()) || !self.has_hook("power-cycle");
+            self.engine.cancels = cancelled || silent || !is_busy(&self.obstacles()) || !self.can_restart();
         }
         for (obstacle, action) in [(Obstacle::Paused, "stopPause"), (Obstacle::Charging, "stopCharging")] {
             if self.obstacles().contains(&obstacle) {
@@ -151,10 +161,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         if !self.obstacles().is_empty() && only_errors(&self.obstacles()) {
             self.order_where_it_stands().await?;
         }
-        if self.obstacles().contains(&Obstacle::Load) && self.has_hook("remove-load") {
-            self.rung("hook `remove-load`")?;
-            let none = Map::from_iter([("loadType".to_owned(), Value::Null)]);
-            self.engine.hook("remove-load", none, true).await?;
+        if self.obstacles().contains(&Obstacle::Load) && self.have_done(HookEffect::RemovesLoads, Value::Null).await? {
             self.rests_within(self.time("settle")).await?;
         }
         Ok(())
@@ -227,20 +234,19 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             "startNodeId": here, "endNodeId": nearest.id,
         }]);
         self.order(nodes, edges).await?;
-        if self.rests_within(self.time("drive")).await? || !self.has_hook("move-to") {
+        if self.rests_within(self.time("drive")).await? {
             return Ok(());
         }
-        self.rung("hook `move-to`")?;
-        let to = Map::from_iter([("nodeId".to_owned(), nearest.id.into())]);
-        self.engine.hook("move-to", to, true).await?;
-        self.rests_within(self.time("settle")).await?;
+        if self.have_done(HookEffect::MovesToNode, nearest.id.into()).await? {
+            self.rests_within(self.time("settle")).await?;
+        }
         Ok(())
     }
 
     /// A vehicle that looks idle and refuses everything is of no use to the next test. It is asked when the last order
     /// of a test never showed, and from the first time it was found so after every test.
     pub(super) async fn still_takes_orders(&mut self) -> Result<(), EngineError> {
-        let may = self.setup.capabilities.motion.is_ok() && self.has_hook("power-cycle") && self.unhelped < 2;
+        let may = self.setup.capabilities.motion.is_ok() && self.can_restart() && self.unhelped < 2;
         let judge = self.engine.recorder.judge();
         if may && !self.engine.interrupted() && is_stalled(judge, self.home.since, self.time("drive") / 2) {
             self.unhelped += 1;

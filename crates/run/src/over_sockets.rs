@@ -226,7 +226,7 @@ impl SocketRun {
         }
         RunPlan {
             retained,
-            ..RunPlan::of(&subject, pack, &time, setup, &hooks)
+            ..RunPlan::of(&subject, pack, &time, setup, (&hooks, &library.rules.hooks))
         }
     }
 

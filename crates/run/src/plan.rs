@@ -13,7 +13,7 @@ use super::risk::by_risk;
 use super::session::Setup;
 use tck_course::Layout;
 use tck_journal::Reason;
-use tck_pack::{Pack, Participant, Role};
+use tck_pack::{Hooks, Pack, Participant, Role};
 use tck_profile::HookAction;
 use tck_suite::model::{Test, Verb};
 
@@ -123,10 +123,10 @@ impl RunPlan {
         pack: &Pack,
         time: &Value,
         mut setup: Setup,
-        known: &BTreeMap<String, How>,
+        (known, vocabulary): (&BTreeMap<String, How>, &Hooks),
     ) -> Self {
         if subject.role == Role::Agv {
-            by_risk(&mut setup.tests);
+            by_risk(&mut setup.tests, vocabulary);
         }
         let gate = |test: &Test| gate(&setup, test);
         let may_run = |test: &Test| matches!(gate(test).0, Waits::Runs | Waits::DependsOnDevice);

@@ -1,5 +1,6 @@
 //! The order in which tests run: what needs nothing of a vehicle comes first, and what may strand or block it last.
 
+use tck_pack::{HookRisk, Hooks};
 use tck_profile::SampleKind;
 use tck_suite::model::{Test, Verb};
 
@@ -27,12 +28,12 @@ enum Risk {
 }
 
 /// The tests by what they may do to the vehicle; where that is the same, as they stood.
-pub(super) fn by_risk(tests: &mut [std::sync::Arc<Test>]) {
+pub(super) fn by_risk(tests: &mut [std::sync::Arc<Test>], hooks: &Hooks) {
     // Once for each test: the texts of its steps are searched.
-    tests.sort_by_cached_key(|test| risk(test));
+    tests.sort_by_cached_key(|test| risk(test, hooks));
 }
 
-fn risk(test: &Test) -> Risk {
+fn risk(test: &Test, hooks: &Hooks) -> Risk {
     let mut worst = if test.moves { Risk::Driven } else { Risk::Nothing };
     if test
         .course
@@ -44,7 +45,10 @@ fn risk(test: &Test) -> Risk {
     for step in test.sections().into_iter().flat_map(|(_, steps)| steps) {
         let own = match &step.verb {
             Verb::Link(_) => Risk::Connection,
-            Verb::Operator(operator) => of_hook(&operator.hook),
+            Verb::Operator(operator) => {
+                let hook = hooks.find(&operator.hook, test.device);
+                hook.map_or(Risk::ByHand, |hook| hook.risk.into())
+            }
             Verb::Serve(_) => Risk::Maps,
             Verb::Send(_) => of_text(step.span.text()),
             _ => Risk::Nothing,
@@ -54,13 +58,15 @@ fn risk(test: &Test) -> Risk {
     worst
 }
 
-fn of_hook(hook: &str) -> Risk {
-    match hook {
-        "power-cycle" | "shutdown" | "start" => Risk::Power,
-        "provoke-error" | "clear-error" | "emergency-stop" | "release-emergency-stop" => Risk::Faults,
-        "set-mode" | "drive-manually" | "push-out" | "enter-field" | "leave-field" => Risk::Modes,
-        "enable-map" | "use-lift" | "shift-position" => Risk::Maps,
-        _ => Risk::ByHand,
+impl From<HookRisk> for Risk {
+    fn from(risk: HookRisk) -> Self {
+        match risk {
+            HookRisk::ByHand => Self::ByHand,
+            HookRisk::Maps => Self::Maps,
+            HookRisk::Modes => Self::Modes,
+            HookRisk::Faults => Self::Faults,
+            HookRisk::Power => Self::Power,
+        }
     }
 }
 

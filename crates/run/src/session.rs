@@ -25,7 +25,7 @@ use tck_journal::event::{Event, Gate, Plan, PlannedTest};
 use tck_judge::RunJudge;
 use tck_net::link::Link;
 use tck_net::link::mqtt::BenchInfo;
-use tck_pack::Role;
+use tck_pack::{HookEffect, Role};
 use tck_result::{RunResult, TestResult};
 use tck_suite::model::Test;
 
@@ -224,8 +224,9 @@ pub(super) struct Session<'a, L, O> {
 
 impl<'a, L: Link, O: Operator> Session<'a, L, O> {
     fn new(engine: &'a mut Engine<L, O>, mut setup: Setup, progress: &'a mut dyn Progress) -> Self {
-        if engine.recorder.judge().role() == Role::Agv {
-            by_risk(&mut setup.tests);
+        let ground = engine.recorder.judge().ground();
+        if ground.role == Role::Agv {
+            by_risk(&mut setup.tests, &ground.hooks);
         }
         Self {
             engine,
@@ -476,7 +477,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         }
         let learned = self.engine.recorder.judge().ground().waivers.len() > known;
         if !learned && self.strikes.is_worth_a_restart(&place) {
-            let has_hook = self.engine.operator.hooks().iter().any(|hook| hook == "power-cycle");
+            let has_hook = self.engine.hook_that(HookEffect::PowerCycles).is_some();
             if !has_hook || !self.restart().await? {
                 self.strikes.missed(test, &place);
                 return Ok(None);

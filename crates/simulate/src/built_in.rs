@@ -226,3 +226,22 @@ impl BuiltIn {
         vehicles.map(|vehicle| Box::new(DevicePeer(mock(vehicle.config.clone()))) as Box<dyn Peer>)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_hook_of_a_built_in_device_is_one_of_the_suites_and_named_once() {
+        let hooks = &tck_testing::library().rules.hooks;
+        for (role, names) in [
+            (Role::Agv, ReferenceAgv::HOOKS),
+            (Role::MasterControl, ReferenceMasterControl::HOOKS),
+        ] {
+            for (at, name) in names.iter().enumerate() {
+                assert!(hooks.find(name, role).is_some(), "{role}: {name}");
+                assert!(!names[..at].contains(name), "{role}: {name}");
+            }
+        }
+    }
+}

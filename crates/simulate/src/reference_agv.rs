@@ -429,7 +429,6 @@ impl ReferenceAgv {
         "enable-map",
         "enter-field",
         "leave-field",
-        "move-to",
         "push-out",
         "shift-position",
         "place-obstacle",

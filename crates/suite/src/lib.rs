@@ -32,11 +32,11 @@ use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
 pub use exceptions::{Exceptions, Unfound, Unproven};
-pub use lint::{HookFacts, PackVocabulary, RequirementFacts, Variable, Vocabulary, harness_topics, variables};
+pub use lint::{PackVocabulary, RequirementFacts, Variable, Vocabulary, harness_topics, variables};
 
 use model::{Monitor, Test};
 use tck_base::diagnostic::Diagnostic;
-use tck_pack::{Assets, Catalogue, Packs};
+use tck_pack::{Assets, Catalogue, Hooks, Packs};
 use tck_view::Field;
 
 /// What the linter has to know of a named check.
@@ -89,7 +89,7 @@ impl Suites {
         packs: &Packs,
         catalogue: &Catalogue,
         checks: &[CheckInfo],
-        hooks: &[HookFacts],
+        hooks: &Hooks,
     ) -> Result<Self, Vec<Diagnostic>> {
         let vocabulary = PackVocabulary::new(packs, catalogue, hooks);
         load::load(files(assets), &vocabulary, checks, &|path| assets.is_checked(path))
@@ -105,7 +105,7 @@ impl Suites {
         packs: &Packs,
         catalogue: &Catalogue,
         checks: &[CheckInfo],
-        hooks: &[HookFacts],
+        hooks: &Hooks,
     ) -> Result<Vec<Arc<Test>>, Vec<Diagnostic>> {
         let vocabulary = PackVocabulary::new(packs, catalogue, hooks);
         let states = assets.under("suites/states/");
@@ -148,7 +148,7 @@ impl Suites {
         packs: &Packs,
         catalogue: &Catalogue,
         checks: &[CheckInfo],
-        hooks: &[HookFacts],
+        hooks: &Hooks,
     ) -> Result<Self, Vec<Diagnostic>> {
         let vocabulary = PackVocabulary::new(packs, catalogue, hooks);
         load::load_text(name, text, files(assets), &vocabulary, checks)

@@ -57,7 +57,7 @@ pub(super) fn load<'a>(
             stray(path, &mut problems);
             continue;
         };
-        if matches!(folder, "requirements" | "explore") || hidden_or_note(rest) {
+        if matches!(folder, "requirements" | "explore" | "hooks") || hidden_or_note(rest) {
             continue;
         }
         let source = Source::new(path, text);
@@ -143,7 +143,7 @@ fn taken_twice(code: &'static str, title: String, second: &Arc<Source>, first: &
 fn stray(path: &str, problems: &mut Problems) {
     problems.add(
         Diagnostic::whole("stray-file", format!("`{path}` is not a suite")).hint(
-            "suites are .yaml files below agv/, master-control/, states/, monitors/, qualification/ or requirements/",
+            "suites are .yaml files below agv/, master-control/, states/, monitors/, qualification/, requirements/, hooks/ or explore/",
         ),
     );
 }

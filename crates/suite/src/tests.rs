@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::LazyLock;
 
 use proptest::prelude::*;
 
 use super::model::{Extent, From, Purpose, RoutePlace, Section, Verb};
 use super::*;
 use tck_base::pattern::TermKind;
-use tck_pack::Role;
+use tck_pack::Hooks;
 use tck_view::StateView;
 
 const CHECKS: [CheckInfo; 1] = [CheckInfo {
@@ -18,18 +19,7 @@ const CHECKS: [CheckInfo; 1] = [CheckInfo {
     needs: &[],
 }];
 
-const HOOKS: [HookFacts; 2] = [
-    HookFacts {
-        name: "power-cycle",
-        role: Role::Agv,
-        parameters: &[],
-    },
-    HookFacts {
-        name: "dispatch",
-        role: Role::MasterControl,
-        parameters: &["from", "to"],
-    },
-];
+static HOOKS: LazyLock<Hooks> = LazyLock::new(|| Hooks::load(&Assets::of_source_tree().unwrap()).unwrap());
 
 /// The good suites by path, as they would lie below `suites/`.
 fn good() -> BTreeMap<String, String> {

@@ -4,6 +4,8 @@ use std::collections::VecDeque;
 
 use tck_base::clock::Moment;
 use tck_journal::event::Event;
+use tck_pack::HookInfo;
+use tck_profile::{VehicleEffect, find_vehicle_word};
 use tck_view::{Field, OrderView, StateView};
 
 use crate::observation::Observation;
@@ -107,39 +109,6 @@ fn refused(state: &StateView) -> Vec<u64> {
     named.collect()
 }
 
-/// What the harness can do to a vehicle, as far as its master control has to find its bearings again.
-const MOVES: [&str; 14] = [
-    "reset",
-    "power-cycle",
-    "shutdown",
-    "start",
-    "break-off",
-    "place-on",
-    "move-to",
-    "push-out",
-    "drive-manually",
-    "lose-position",
-    "find-position",
-    "use-lift",
-    "set-mode",
-    "well-behaved",
-];
-
-/// What makes the states or the answers of a vehicle less than the truth.
-const DEVIATES: [&str; 11] = [
-    "answer-after",
-    "state-interval",
-    "lose-states",
-    "stay-silent",
-    "ignore-orders",
-    "reject-orders",
-    "reject-updates",
-    "show",
-    "publish",
-    "speak-version",
-    "stale-will",
-];
-
 /// What happened to the vehicle from outside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outside {
@@ -191,17 +160,14 @@ impl MockVehicle {
                 Outside::No
             }
             Event::Vehicle { vehicle, what, .. } if self.number.is_none_or(|number| number == *vehicle) => {
-                let what = what.as_str();
-                if MOVES.contains(&what) {
-                    Outside::Moved
-                } else if DEVIATES.contains(&what) {
-                    Outside::Deviates
-                } else {
-                    Outside::No
+                match find_vehicle_word(what) {
+                    Some(word) if word.has(VehicleEffect::Moves) => Outside::Moved,
+                    Some(word) if word.has(VehicleEffect::Deviates) => Outside::Deviates,
+                    _ => Outside::No,
                 }
             }
             Event::Fault { .. } => Outside::Lost,
-            Event::Hook { hook, .. } if matches!(hook.as_str(), "start" | "shutdown" | "configure") => Outside::Lost,
+            Event::Hook { hook, .. } if setting.hook(hook).is_some_and(HookInfo::may_restart) => Outside::Lost,
             _ => Outside::No,
         }
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value};
 use tck_base::time::TimeLimits;
-use tck_pack::{Pack, Role};
+use tck_pack::{HookInfo, Hooks, Pack, Role};
 
 /// What does not change from record to record.
 #[derive(Clone, Copy, Debug)]
@@ -21,4 +21,14 @@ pub struct Setting<'a> {
     pub bindings: &'a Map<String, Value>,
     /// How long something may take.
     pub time: &'a TimeLimits,
+    /// What can be done to the device, and what follows from it.
+    pub hooks: &'a Hooks,
+}
+
+impl<'a> Setting<'a> {
+    /// What is known of a hook for the side under test; nothing of one that the suites do not have.
+    #[must_use]
+    pub fn hook(&self, name: &str) -> Option<&'a HookInfo> {
+        self.hooks.find(name, self.role)
+    }
 }

@@ -121,7 +121,8 @@ fn variables_of_flags_are_known_to_the_settings() {
         environment: variables.into_iter().map(|name| (name, "x".to_owned())).collect(),
         ..Default::default()
     };
-    if let Err(wrong) = tck_profile::load(None, &[], &surroundings) {
+    let hooks = tck_pack::Hooks::load(&crate::embedded()).expect("hooks");
+    if let Err(wrong) = tck_profile::load(None, &[], &surroundings, &hooks) {
         panic!("{}", wrong[0]);
     }
 }

@@ -24,15 +24,16 @@ const FOCUS: u32 = 20;
 /// `explore`.
 pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
     let surroundings = Surroundings::of_process();
+    let library = crate::assets::library(arguments.suites.own())?;
     let effective = profile::load(
         arguments.device.profile.as_deref(),
         &arguments.device.settings(),
         &surroundings,
+        &library.rules.hooks,
     )?;
     if !arguments.stimuli {
         reference::is_tested(&Asked::of_explore(arguments), &effective, &surroundings)?;
     }
-    let library = crate::assets::library(arguments.suites.own())?;
     let pack = tck_run::pack_of(&library, &effective)?;
     let role = effective.profile.device.role;
     check_faults(role, &arguments.fault)?;

@@ -4,6 +4,7 @@ use super::{Command, Found};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::{Event, Packet};
+use tck_pack::HookInfo;
 use tck_view::ConnectionView;
 use tck_world::{Listen, Observation, Topic};
 
@@ -49,7 +50,7 @@ impl Running for Away {
                 packet: Packet::Connect { .. },
                 ..
             } => self.delay(now),
-            Event::Hook { hook, .. } if matches!(hook.as_str(), "start" | "shutdown" | "configure") => self.delay(now),
+            Event::Hook { hook, .. } if context.hook(hook).is_some_and(HookInfo::may_restart) => self.delay(now),
             _ => {}
         }
         if let Some(message) = record.said_connection() {

@@ -9,6 +9,7 @@ use crate::finding::quote;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::Event;
+use tck_profile::{VehicleEffect, find_vehicle_word};
 use tck_view::{Node, OrderView, Print};
 use tck_world::ordered::ELEMENTS;
 use tck_world::{Fact, Listen, Observation, Outside, ShownState, Topic};
@@ -426,7 +427,9 @@ impl Follow {
             self.interrupted();
         }
         match record.event() {
-            Event::Vehicle { what, .. } if matches!(what.as_str(), "break-off" | "shutdown" | "start") => {
+            Event::Vehicle { what, .. }
+                if find_vehicle_word(what).is_some_and(|word| word.has(VehicleEffect::ComesOrGoes)) =>
+            {
                 self.parked = self.orders.pop_back().or(self.parked.take());
             }
             _ => self.parked = None,

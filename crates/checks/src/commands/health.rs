@@ -11,6 +11,7 @@ use crate::finding::quote;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::Event;
+use tck_pack::HookEffect;
 use tck_view::{ConnectionView, OrderView, StateView};
 use tck_world::{Listen, Observation, Topic};
 
@@ -66,7 +67,9 @@ impl Running for Health {
     ) -> bool {
         let now = record.at().moment;
         if let Event::Hook { hook, ok: true, .. } = record.event()
-            && hook == "dispatch"
+            && context
+                .hook(hook)
+                .is_some_and(|hook| hook.has(HookEffect::OrdersTransport))
             && self.reason.is_some()
         {
             self.waits.get_or_insert(now);

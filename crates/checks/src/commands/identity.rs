@@ -7,6 +7,7 @@ use super::{Command, ELEMENTS, Found, elements, nodes_in_sequence, place_of, sho
 use crate::finding::{quote, unclear};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::Event;
+use tck_pack::HookInfo;
 use tck_view::{ActionView, Element, Node, Print};
 use tck_world::{Fact, Listen, Observation, Topic};
 
@@ -133,9 +134,14 @@ fn placed<'c>(command: Command<'c>) -> Vec<(String, &'c ActionView)> {
 }
 
 impl Running for ActionIds {
-    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
         match record.event() {
-            Event::Hook { hook, .. } if matches!(hook.as_str(), "start" | "shutdown") => self.known.clear(),
+            Event::Hook { hook, .. } if context.hook(hook).is_some_and(HookInfo::restarts) => self.known.clear(),
             Event::Answer { .. } => self.known.clear(),
             _ => {}
         }

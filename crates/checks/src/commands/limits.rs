@@ -6,6 +6,7 @@ use crate::finding::quote;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::{Event, LinkFault};
+use tck_pack::HookInfo;
 use tck_view::{ActionView, ArrayLimits, Field, Json, Member, Number, ProtocolLimits, Timing};
 use tck_world::{Fact, Factsheet, Listen, Observation, Topic};
 
@@ -183,7 +184,7 @@ impl Running for Interval {
             } if self.cut => {}
             // What is held back or lost comes at other times than it was sent.
             Event::Fault { .. } => self.last = None,
-            Event::Hook { hook, .. } if matches!(hook.as_str(), "start" | "shutdown") => self.last = None,
+            Event::Hook { hook, .. } if context.hook(hook).is_some_and(HookInfo::restarts) => self.last = None,
             _ => {}
         }
         let order = Command::read(record).and_then(Command::order);

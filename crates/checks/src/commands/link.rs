@@ -7,7 +7,7 @@ use crate::finding::{broken, quote, remark};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::{Close, Event, Packet};
-use tck_pack::Role;
+use tck_pack::{HookInfo, Role};
 use tck_view::ConnectionView;
 use tck_world::{End, Listen, Observation, Topic, takes};
 
@@ -106,7 +106,7 @@ impl Running for Alive {
                 self.gone = None;
                 self.played = Some(now);
             }
-            Event::Hook { hook, .. } if matches!(hook.as_str(), "start" | "shutdown" | "configure") => self.gone = None,
+            Event::Hook { hook, .. } if context.hook(hook).is_some_and(HookInfo::may_restart) => self.gone = None,
             Event::Hook {
                 ok: false,
                 hook,

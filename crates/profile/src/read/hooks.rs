@@ -5,7 +5,6 @@ use toml::de::DeValue;
 
 use super::{Entry, Reader};
 use crate::hook_action::{Hook, HookAction, NATURAL_TRAFFIC, RESTART_DEVICE, START_DEVICE, STOP_DEVICE};
-use crate::hooks::HOOKS;
 use crate::key::{COMMON_PLACEHOLDERS, Kind};
 use crate::secret::SecretText;
 use crate::value::{self, Value};
@@ -14,13 +13,23 @@ use tck_base::diagnostic;
 impl Reader<'_> {
     pub(super) fn hook(&mut self, (name, value): Entry<'_, '_>) {
         let id = name.get_ref().as_ref();
-        if !HOOKS.iter().any(|hook| hook.name == id) {
-            let mut known: Vec<&str> = HOOKS.iter().map(|hook| hook.name).collect();
-            known.sort_unstable();
-            known.dedup();
-            self.unknown_key(name.span(), &format!("there is no hook `{id}`"), id, &known);
+        let hooks = self.hooks;
+        let Some(info) = hooks.named(id).next() else {
+            let hint = match diagnostic::closest(id, hooks.all().map(|hook| hook.name.as_str())) {
+                Some(close) => format!("did you mean `{close}`?"),
+                None => {
+                    "`vda5050-tck list hooks` shows all; one of suites of your own is known with `--suites`".to_owned()
+                }
+            };
+            self.complain(
+                "unknown-key",
+                name.span(),
+                &format!("there is no hook `{id}`"),
+                "not known",
+                Some(hint),
+            );
             return;
-        }
+        };
         let what = format!("hook `{id}`");
         let Some(members) = self.members(
             &what,
@@ -76,6 +85,7 @@ impl Reader<'_> {
         }
         let hook = Hook {
             name: id.to_owned(),
+            info: info.clone(),
             action,
             timeout,
             span: self.span(name.span()),
@@ -92,12 +102,11 @@ impl Reader<'_> {
             "listen" => HookAction::NaturalTraffic,
             _ => self.http(&what, value)?,
         };
-        let mut known: Vec<&str> = HOOKS
-            .iter()
-            .filter(|info| info.name == hook)
-            .flat_map(|info| info.parameters)
-            .chain(COMMON_PLACEHOLDERS)
-            .copied()
+        let hooks = self.hooks;
+        let parameters = hooks.named(hook).flat_map(|info| &info.parameters);
+        let mut known: Vec<&str> = parameters
+            .map(|parameter| parameter.name.as_str())
+            .chain(COMMON_PLACEHOLDERS.iter().copied())
             .collect();
         known.dedup();
         for text in action.texts() {

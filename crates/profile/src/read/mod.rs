@@ -17,7 +17,7 @@ use super::layer::{Layer, Origin, Setter};
 use super::value::{self, Refusal, Value};
 use super::{Deviation, LayoutList};
 use tck_base::diagnostic::{self, Diagnostic, Source, Span};
-use tck_pack::RequirementId;
+use tck_pack::{Hooks, RequirementId};
 
 const SECTIONS: [&str; 11] = [
     "device",
@@ -39,7 +39,12 @@ type Entry<'a, 'i> = (&'a Spanned<std::borrow::Cow<'i, str>>, &'a Spanned<DeValu
 ///
 /// # Errors
 /// Every mistake that could be found, in the order of the file.
-pub(super) fn read(source: &Arc<Source>, folder: &Path, origin: Origin) -> Result<Layer, Vec<Diagnostic>> {
+pub(super) fn read(
+    source: &Arc<Source>,
+    folder: &Path,
+    origin: Origin,
+    hooks: &Hooks,
+) -> Result<Layer, Vec<Diagnostic>> {
     let document = DeTable::parse(&source.text).map_err(|error| {
         let at = error.span().unwrap_or(0..0);
         let span = Span::new(source, at.start, at.end);
@@ -49,6 +54,7 @@ pub(super) fn read(source: &Arc<Source>, folder: &Path, origin: Origin) -> Resul
         source,
         folder,
         origin,
+        hooks,
         layer: Layer::default(),
         wrong: Vec::new(),
     };
@@ -66,6 +72,7 @@ struct Reader<'s> {
     source: &'s Arc<Source>,
     folder: &'s Path,
     origin: Origin,
+    hooks: &'s Hooks,
     layer: Layer,
     wrong: Vec<Diagnostic>,
 }

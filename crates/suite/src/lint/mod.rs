@@ -14,19 +14,21 @@ mod vocabulary;
 
 use std::collections::BTreeSet;
 
+use serde_json::Value;
+
 pub use names::{Variable, variables};
 pub use pictures::harness_topics;
-pub use vocabulary::{HookFacts, PackVocabulary, RequirementFacts, Vocabulary};
+pub use vocabulary::{PackVocabulary, RequirementFacts, Vocabulary};
 
 use self::paths::Topic;
 use self::scope::Scope;
 use super::CheckInfo;
 use super::fields::Problems;
-use super::model::{About, Assertion, Binding, Monitor, Need, Rule, Selection, Test, Verb};
+use super::model::{About, Assertion, Binding, Monitor, Need, Operator, Rule, Selection, Test, Verb};
 use tck_base::diagnostic::{Diagnostic, Span, closest, did_you_mean};
-use tck_base::pattern::Pattern;
+use tck_base::pattern::{Pattern, TermKind};
 use tck_course::is_station;
-use tck_pack::{RequirementId, Role, Version, VersionRange};
+use tck_pack::{HookInfo, RequirementId, Role, Version, VersionRange};
 use tck_profile::{FOUND, SAMPLE_ACTIONS, STATEMENTS};
 
 /// Where the header keys of a file are written.
@@ -184,7 +186,7 @@ fn within(span: &Span, text: &str) -> Span {
     }
 }
 
-impl Linter<'_> {
+impl<'a> Linter<'a> {
     fn no_version(&mut self, at: &Span, label: &str) {
         let known: Vec<String> = self.vocabulary.versions().iter().map(ToString::to_string).collect();
         self.problems.add(
@@ -255,7 +257,9 @@ impl Linter<'_> {
                     }
                 }
             }
-            Need::Hook(name) => self.hook(name, &[], at),
+            Need::Hook(name) => {
+                self.hook(name, at);
+            }
             Need::Optional(path) | Need::NoOptional(path) | Need::NotRequired(path) => {
                 let names: Vec<&str> = path.split('.').collect();
                 if let Some((topic, below)) = names.split_first() {
@@ -321,22 +325,36 @@ impl Linter<'_> {
         }
     }
 
-    fn hook(&mut self, name: &str, parameters: &[&str], at: &Span) {
-        let Some(role) = self.role else { return };
-        let hooks = self.vocabulary.hooks(role);
-        match hooks.iter().find(|hook| hook.name == name) {
-            None => {
-                let names: Vec<&str> = hooks.iter().map(|hook| hook.name).collect();
-                self.problems.unknown("unknown-hook", at, "hook", name, names);
-            }
-            Some(hook) => {
-                for parameter in parameters {
-                    if !hook.parameters.contains(parameter) {
-                        let known = hook.parameters.iter().copied();
-                        self.problems
-                            .unknown("unknown-argument", at, "parameter of the hook", parameter, known);
-                    }
-                }
+    fn hook(&mut self, name: &str, at: &Span) -> Option<&'a HookInfo> {
+        let role = self.role?;
+        let hooks = self.vocabulary.hooks();
+        let found = hooks.find(name, role);
+        if found.is_none() {
+            let names: Vec<&str> = hooks.of(role).map(|hook| hook.name.as_str()).collect();
+            self.problems.unknown("unknown-hook", at, "hook", name, names);
+        }
+        found
+    }
+
+    fn operator(&mut self, operator: &Operator, at: &Span) {
+        let Some(hook) = self.hook(&operator.hook, at) else {
+            return;
+        };
+        for (name, term) in &operator.with {
+            let Some(parameter) = hook.parameter(name) else {
+                let known = hook.parameters.iter().map(|parameter| parameter.name.as_str());
+                self.problems
+                    .unknown("unknown-argument", at, "parameter of the hook", name, known);
+                continue;
+            };
+            let mut ids = parameter.values.iter().map(|value| value.id.as_str()).peekable();
+            if let TermKind::Literal(Value::String(given)) = &term.kind
+                && ids.peek().is_some()
+                && !ids.clone().any(|id| id == given)
+            {
+                let what = format!("value of `{name}` of the hook");
+                self.problems
+                    .unknown("unknown-hook-value", &term.span, &what, given, ids);
             }
         }
     }

@@ -92,10 +92,7 @@ impl Linter<'_> {
                     self.topic(topic, packs, &within(&step.span, topic), Vec::new());
                 }
             }
-            Verb::Operator(operator) => {
-                let parameters: Vec<&str> = operator.with.iter().map(|(name, _)| name.as_str()).collect();
-                self.hook(&operator.hook, &parameters, at);
-            }
+            Verb::Operator(operator) => self.operator(operator, at),
             Verb::Vehicle(vehicle) => self.vehicle(vehicle, step),
             Verb::Serve(_) => {}
         }

@@ -1,4 +1,4 @@
-//! What the linter asks the packs, the catalogue and the list of hooks.
+//! What the linter asks the packs, the catalogue and the vocabulary of hooks.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use serde_json::Value;
 
-use tck_pack::{Breakage, Catalogue, Ground, Packs, Role, Shape, Version};
+use tck_pack::{Breakage, Catalogue, Ground, Hooks, Packs, Role, Shape, Version};
 use tck_view::Field;
 
 /// What the catalogue says about one requirement.
@@ -16,17 +16,6 @@ pub struct RequirementFacts {
     pub roles: Vec<Role>,
     /// The packs that have it, as indices into [`Vocabulary::versions`].
     pub packs: Vec<usize>,
-}
-
-/// A hook that `operator:` can name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct HookFacts {
-    /// Its name.
-    pub name: &'static str,
-    /// The side it is for.
-    pub role: Role,
-    /// The parameters it takes.
-    pub parameters: &'static [&'static str],
 }
 
 /// The names a suite may use. A pack is meant by its index into [`Vocabulary::versions`].
@@ -49,15 +38,15 @@ pub trait Vocabulary {
     fn requirement(&self, id: &str) -> Option<RequirementFacts>;
     /// Every requirement id.
     fn requirements(&self) -> Vec<String>;
-    /// The hooks of one side.
-    fn hooks(&self, role: Role) -> Vec<HookFacts>;
+    /// What `operator:` can name.
+    fn hooks(&self) -> &Hooks;
 }
 
 /// The names of the real packs and catalogue.
 pub struct PackVocabulary<'a> {
     packs: &'a Packs,
     catalogue: &'a Catalogue,
-    hooks: &'a [HookFacts],
+    hooks: &'a Hooks,
     /// Suites ask for the same few paths over and over, and a schema takes its time to answer.
     shapes: RefCell<HashMap<String, Option<Rc<Shape>>>>,
 }
@@ -65,7 +54,7 @@ pub struct PackVocabulary<'a> {
 impl<'a> PackVocabulary<'a> {
     /// The names of these packs, this catalogue and the hooks a profile can have.
     #[must_use]
-    pub fn new(packs: &'a Packs, catalogue: &'a Catalogue, hooks: &'a [HookFacts]) -> Self {
+    pub fn new(packs: &'a Packs, catalogue: &'a Catalogue, hooks: &'a Hooks) -> Self {
         Self {
             packs,
             catalogue,
@@ -151,7 +140,7 @@ impl Vocabulary for PackVocabulary<'_> {
             .collect()
     }
 
-    fn hooks(&self, role: Role) -> Vec<HookFacts> {
-        self.hooks.iter().copied().filter(|hook| hook.role == role).collect()
+    fn hooks(&self) -> &Hooks {
+        self.hooks
     }
 }
