@@ -14,7 +14,8 @@ use super::side::{Apart, Side};
 use tck_base::clock::Moment;
 use tck_pack::{Pack, Role};
 
-/// See the module.
+/// What a vehicle and its master control say to each other, in order: shown to the judge of each side, and where
+/// something is missing between two messages, so that nobody is blamed for a hole in the recording.
 #[derive(Default)]
 pub(super) struct Conversation {
     /// The rules, once the version is known.

@@ -12,7 +12,7 @@ use tck_journal::event::{Event, Packet};
 use tck_pack::Role;
 use tck_world::{Listen, Observation};
 
-/// See the module.
+/// `headerId` counts every message of a topic.
 pub(super) const ID_RISES: Check = Check {
     name: "header/id-rises",
     decides: &["HDR-02"],

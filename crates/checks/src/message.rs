@@ -82,7 +82,7 @@ pub(super) const ENCODING: Check = Check {
 struct Schema {
     /// The member names of each topic's messages.
     members: BTreeMap<String, Vec<String>>,
-    /// The same of what is inside of messages: topic and path.
+    /// The member names of what is inside of messages, by topic and path.
     inner: Vec<(&'static str, &'static [&'static str], Vec<String>)>,
     /// An angle beyond pi by what single precision does to it was remarked on.
     rounded: bool,

@@ -122,7 +122,7 @@ const LOOKS: [(&str, [&str; 2]); 3] = [
     ("factsheet", ["typeSpecification", "protocolLimits"]),
     ("connection", ["connectionState", "headerId"]),
 ];
-/// So long a device may publish elsewhere before it does on the topic of the name.
+/// How long a device may publish elsewhere before it does on the topic of the name.
 const ELSEWHERE: Duration = Duration::from_secs(30);
 
 /// The name of the topic on which such a message belongs.

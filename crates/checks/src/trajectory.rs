@@ -60,7 +60,7 @@ const ORDERS: usize = 32;
 const SAME: f64 = 0.2;
 /// How far the end of a curve may be from its node, in metres.
 const END: f64 = 0.5;
-/// The same at its start.
+/// How far the start of a curve may be from its node, in metres.
 const START: f64 = 1.0;
 
 /// Reported trajectories of a state: sequenceId, whether it is released, and the trajectory.

@@ -15,7 +15,7 @@ use tck_journal::Entry;
 use tck_journal::event::Event;
 use tck_pack::{Pack, Role};
 
-/// So many ids of a topic are looked for.
+/// How many ids of a topic are looked for.
 const KEPT: usize = 64;
 
 /// A new error so soon after a message is about it.

@@ -17,7 +17,7 @@ pub struct HookInfo {
     pub ends: bool,
 }
 
-/// The same hook; the program of the device may end by it.
+/// Marks a hook by which the program of the device may end.
 const fn ending(hook: HookInfo) -> HookInfo {
     HookInfo { ends: true, ..hook }
 }

@@ -15,7 +15,7 @@ const AFTER_START: &str = "after-start";
 /// The hooks after which the device has just been started.
 const STARTS_IT: [&str; 2] = ["power-cycle", "start"];
 
-/// So often a device is switched on before it is given up.
+/// How often a device is switched on before it is given up.
 const STARTS: usize = 2;
 
 impl<L: Link, O: Operator> Session<'_, L, O> {

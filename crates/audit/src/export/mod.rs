@@ -18,7 +18,8 @@ use parquet::{Cell, Kind, Table};
 use tck_capture::Message;
 use tck_journal::Parsed;
 
-/// See the module.
+/// Messages and findings as tables, for people who go on in their notebooks: a Parquet file for each topic name, and
+/// one of findings.
 pub struct Export {
     folder: PathBuf,
     tables: BTreeMap<String, Table<BufWriter<File>>>,
