@@ -11,9 +11,9 @@ use std::io::Write as _;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use vda5050_tck::bench::Outgoing;
 use vda5050_tck::bench::client::{Client, ClientEvent, ClientOptions};
 use vda5050_tck::bench::endpoint::{Access, Endpoint};
+use vda5050_tck::device::Publication;
 use vda5050_tck::explore::{Coverage, Exploration, Grammar};
 use vda5050_tck::judge::judge;
 use vda5050_tck::link::mqtt::{BenchOptions, MqttBench};
@@ -182,7 +182,7 @@ async fn there_and_back(device: &str, harness: &str, times: usize) -> Vec<f64> {
         assert_eq!(events.recv().await, Some(ClientEvent::Connected));
         (client, events)
     };
-    let message = |topic: &str| Outgoing {
+    let message = |topic: &str| Publication {
         topic: topic.to_owned(),
         payload: vec![b'x'; 3 << 10].into(),
         qos: 0,

@@ -28,6 +28,10 @@
 //! # }
 //! ```
 //!
+//! A build for that needs little of the program. `default-features = false` leaves out its terminal, and what these
+//! features add: `broker` is the embedded broker, for a device without one of its own, `tls` is MQTT and HTTP over TLS,
+//! `captures` are recordings of other tools and traffic that is judged without a test.
+//!
 //! [`library`] reads suites, [`RequestBuilder`] chooses what a run takes on. Everything below stands in crates of its own,
 //! which are named here, too, for the program and its tests, and give no promise to stay as they are. The folder tree is the
 //! architecture; dependencies point one way, from the command line down to the verdict lattice (`tests/architecture.rs`
@@ -41,9 +45,11 @@
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 mod assets;
+#[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod cli;
 mod facade;
+#[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod ui;
 
@@ -54,10 +60,12 @@ pub use tck_pack::Role;
 pub use tck_result::RunResult;
 pub use tck_run::{Criteria, Request, RequestBuilder, Selection};
 
+#[cfg(feature = "captures")]
 #[doc(hidden)]
 pub use tck_audit as audit;
 #[doc(hidden)]
-pub use tck_base::{clock, diagnostic, nurbs, pattern, secrets, verdict, yaml};
+pub use tck_base::{clock, device, diagnostic, nurbs, pattern, secrets, verdict, yaml};
+#[cfg(feature = "captures")]
 #[doc(hidden)]
 pub use tck_capture as capture;
 #[doc(hidden)]
@@ -68,6 +76,7 @@ pub use tck_checks as checks;
 pub use tck_course as course;
 #[doc(hidden)]
 pub use tck_engine as engine;
+#[cfg(feature = "cli")]
 #[doc(hidden)]
 pub use tck_explore as explore;
 #[doc(hidden)]
@@ -80,6 +89,7 @@ pub use tck_net::{bench, broker, link, maps, tap};
 pub use tck_pack as pack;
 #[doc(hidden)]
 pub use tck_profile as profile;
+#[cfg(feature = "cli")]
 #[doc(hidden)]
 pub use tck_qualify as qualify;
 #[doc(hidden)]
@@ -96,6 +106,7 @@ pub use tck_simulate as simulate;
 pub use tck_suite as suite;
 #[doc(hidden)]
 pub use tck_view as view;
+#[cfg(feature = "captures")]
 #[doc(hidden)]
 pub use tck_watch as watch;
 #[doc(hidden)]

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 /// Rooms by layer; an arrow may point to the same layer or down, never up, and there are no circles on one layer. A room
 /// is a crate below `crates/`, a folder of the two crates that hold several (`base` and `net`), or a folder of the program.
-const LAYERS: [(&str, u8); 41] = [
+const LAYERS: [(&str, u8); 42] = [
     ("main", 6),
     ("cli", 6),
     ("ui", 6),
@@ -46,6 +46,7 @@ const LAYERS: [(&str, u8); 41] = [
     ("verdict", 0),
     ("diagnostic", 0),
     ("clock", 0),
+    ("device", 0),
     ("yaml", 0),
     ("nurbs", 0),
     ("pattern", 0),
@@ -56,7 +57,7 @@ const LAYERS: [(&str, u8); 41] = [
 ];
 
 /// The rooms that share a crate with others: of the crates of several rooms and of the program.
-const HELD_TOGETHER: [&str; 19] = [
+const HELD_TOGETHER: [&str; 20] = [
     "main",
     "facade",
     "cli",
@@ -69,6 +70,7 @@ const HELD_TOGETHER: [&str; 19] = [
     "maps",
     "tap",
     "clock",
+    "device",
     "diagnostic",
     "nurbs",
     "pattern",
@@ -549,51 +551,6 @@ fn incoming_messages_stay_values() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Lines that speak of what can be done otherwise: that stands below deviations, and takes hold at the hook points.
-fn lines_about_deviating(text: &str) -> Vec<(usize, &str)> {
-    let words = ["fault", "tolerance", "libert", "deviation", "persona", "lapse"];
-    // Members of the protocol, and what every language has.
-    let others = [
-        "default",
-        "alloweddeviation",
-        "allowed_deviation",
-        "deviation_xy",
-        "deviation_theta",
-        "deviation_range",
-        "deviation range",
-    ];
-    let wrong = |line: &str| {
-        let plain = others
-            .iter()
-            .fold(line.to_lowercase(), |text, other| text.replace(other, ""));
-        words.iter().any(|word| plain.contains(word))
-    };
-    let lines = text.lines().enumerate();
-    lines
-        .filter(|(_, line)| wrong(line))
-        .map(|(at, line)| (at + 1, line.trim()))
-        .collect()
-}
-
-#[test]
-fn the_reference_devices_keep_to_the_standard() {
-    let rooms = ["reference/agv/", "reference/master_control/"];
-    let room = |name: &str| rooms.iter().any(|room| name.starts_with(room)) && !name.ends_with("/hooks.rs");
-    let mut wrong = Vec::new();
-    for (path, text) in sources()
-        .iter()
-        .filter(|(path, _)| room(&in_room(path)) && !is_test_file(path))
-    {
-        for (line, content) in lines_about_deviating(text) {
-            wrong.push(format!("{}:{line}: {content}", in_room(path)));
-        }
-        if text.lines().count() > 400 {
-            wrong.push(format!("{} is longer than 400 lines", in_room(path)));
-        }
-    }
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-}
-
 #[test]
 fn every_module_says_what_it_is_for() {
     let silent: Vec<String> = sources()
@@ -602,6 +559,40 @@ fn every_module_says_what_it_is_for() {
         .map(|(path, _)| in_room(path))
         .collect();
     assert!(silent.is_empty(), "{silent:?}");
+}
+
+/// Whether the text of a comment needs what stands around it: it goes on from the line before, or only begins.
+fn leans_on_others(comment: &str) -> bool {
+    let bare = comment.trim_end_matches(['.', ',', ':']);
+    comment.starts_with("The same")
+        || comment.starts_with("See the module")
+        || comment.starts_with('…')
+        || bare.ends_with('…')
+}
+
+#[test]
+fn documentation_stands_alone() {
+    for leaning in [
+        "The same with two vehicles.",
+        "See the module.",
+        "… and to the other side.",
+        "Up to here …",
+    ] {
+        assert!(leans_on_others(leaning));
+    }
+    assert!(!leans_on_others("What `${each.…}` names."));
+    let mut wrong = Vec::new();
+    for (path, text) in sources() {
+        let lines = || text.lines().map(str::trim);
+        let before = std::iter::once("").chain(lines());
+        for (at, (before, line)) in before.zip(lines()).enumerate() {
+            let of = |line: &str| line.starts_with("///") || line.starts_with("//!");
+            if of(line) && (!of(before) && leans_on_others(line[3..].trim()) || line.ends_with('…')) {
+                wrong.push(format!("{}:{}: {line}", in_room(&path), at + 1));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "say what it is:\n{}", wrong.join("\n"));
 }
 
 /// No code line of these modules names one of these words, but in these places.

@@ -107,6 +107,61 @@ fn none_is_there_twice_without_a_reason_and_every_reason_is_needed() {
     }
 }
 
+/// The names of the packages that the library is compiled with, with these of its features only.
+fn compiled_with(features: &str) -> BTreeSet<String> {
+    let output = Command::new(env!("CARGO"))
+        .args([
+            "tree", "--locked", "--edges", "normal", "--prefix", "none", "--format", "{p}",
+        ])
+        .args([
+            "--package",
+            env!("CARGO_PKG_NAME"),
+            "--no-default-features",
+            "--features",
+            features,
+        ])
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let names = String::from_utf8(output.stdout).unwrap();
+    names
+        .lines()
+        .filter_map(|line| line.split(' ').next())
+        .map(str::to_owned)
+        .collect()
+}
+
+#[test]
+fn a_feature_brings_what_it_needs_and_nothing_else_has_it() {
+    let bare = compiled_with("");
+    for (feature, brings) in [
+        (
+            "cli",
+            &[
+                "clap",
+                "crossterm",
+                "indicatif",
+                "ratatui",
+                "tck-explore",
+                "tck-qualify",
+            ][..],
+        ),
+        ("broker", &["mqtt5"]),
+        ("tls", &["ring", "rustls", "tokio-rustls", "rustls-native-certs"]),
+        (
+            "captures",
+            &["tck-audit", "tck-capture", "tck-watch", "etherparse", "pcap-parser"],
+        ),
+    ] {
+        let with = compiled_with(feature);
+        for package in brings {
+            assert!(with.contains(*package), "{feature} lacks {package}");
+            assert!(!bare.contains(*package), "without {feature} there is {package}");
+        }
+    }
+}
+
 #[test]
 fn a_licence_expression_is_read_as_it_is_meant() {
     let allowed = BTreeSet::from(["MIT".to_owned(), "ISC".to_owned()]);

@@ -3,11 +3,10 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use vda5050_tck::judge::Library;
 use vda5050_tck::pack::Pack;
+use vda5050_tck::qualify::on_all_cores;
 use vda5050_tck::reference::deviations::agv::FAULTS;
 use vda5050_tck::result::RunResult;
 use vda5050_tck::run::{VirtualRun, run_silently};
@@ -45,21 +44,9 @@ const LASTING: [&str; 20] = [
 const DEPENDENT: &str = include_str!("imperfect/dependent.tsv");
 
 fn run_all(library: &Library, pack: &Pack, requests: &[VirtualRun]) -> Vec<RunResult> {
-    let next = AtomicUsize::new(0);
-    let results = Mutex::new(BTreeMap::new());
-    std::thread::scope(|scope| {
-        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
-            scope.spawn(|| {
-                loop {
-                    let at = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(request) = requests.get(at) else { break };
-                    let finished = run_silently(library, pack, request.clone()).unwrap();
-                    results.lock().unwrap().insert(at, finished.result);
-                }
-            });
-        }
-    });
-    results.into_inner().unwrap().into_values().collect()
+    on_all_cores(requests, |request| {
+        run_silently(library, pack, request.clone()).unwrap().result
+    })
 }
 
 fn verdicts(result: &RunResult) -> BTreeMap<&str, Option<Verdict>> {

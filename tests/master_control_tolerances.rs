@@ -7,13 +7,11 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use vda5050_tck::judge::Library;
 use vda5050_tck::pack::{Pack, Role};
-use vda5050_tck::qualify::decided;
+use vda5050_tck::qualify::{decided, on_all_cores};
 use vda5050_tck::reference::deviations::master_control::TOLERANCES;
 use vda5050_tck::result::RunResult;
 use vda5050_tck::run::{VirtualRun, run_silently};
@@ -25,23 +23,9 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 /// Runs everything on all cores; the results come in the order of the requests.
 fn run_all(library: &Library, pack: &Pack, requests: &[VirtualRun]) -> Vec<RunResult> {
-    let next = AtomicUsize::new(0);
-    let results = Mutex::new(Vec::new());
-    std::thread::scope(|scope| {
-        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
-            scope.spawn(|| {
-                loop {
-                    let at = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(request) = requests.get(at) else { break };
-                    let finished = run_silently(library, pack, request.clone()).unwrap();
-                    results.lock().unwrap().push((at, finished.result));
-                }
-            });
-        }
-    });
-    let mut results = results.into_inner().unwrap();
-    results.sort_by_key(|(at, _)| *at);
-    results.into_iter().map(|(_, result)| result).collect()
+    on_all_cores(requests, |request| {
+        run_silently(library, pack, request.clone()).unwrap().result
+    })
 }
 
 fn with(library: &Library, pack: &Pack, tolerances: &[&str]) -> VirtualRun {

@@ -4,13 +4,11 @@
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use vda5050_tck::judge::Library;
 use vda5050_tck::pack::Pack;
-use vda5050_tck::qualify::{Decider, decided};
+use vda5050_tck::qualify::{Decider, decided, on_all_cores};
 use vda5050_tck::reference::Fault;
 use vda5050_tck::reference::deviations::agv::{FAULTS, TOLERANCES};
 use vda5050_tck::result::RunResult;
@@ -73,24 +71,10 @@ fn unseen() -> BTreeSet<(&'static str, &'static str)> {
 }
 
 /// Runs everything on all cores; the results come in the order of the requests.
-fn run_all(library: &Library, pack: &Pack, requests: Vec<VirtualRun>) -> Vec<RunResult> {
-    let next = AtomicUsize::new(0);
-    let results = Mutex::new(Vec::new());
-    std::thread::scope(|scope| {
-        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
-            scope.spawn(|| {
-                loop {
-                    let at = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(request) = requests.get(at) else { break };
-                    let finished = run_silently(library, pack, request.clone()).unwrap();
-                    results.lock().unwrap().push((at, finished.result));
-                }
-            });
-        }
-    });
-    let mut results = results.into_inner().unwrap();
-    results.sort_by_key(|(at, _)| *at);
-    results.into_iter().map(|(_, result)| result).collect()
+fn run_all(library: &Library, pack: &Pack, requests: &[VirtualRun]) -> Vec<RunResult> {
+    on_all_cores(requests, |request| {
+        run_silently(library, pack, request.clone()).unwrap().result
+    })
 }
 
 fn with(library: &Library, pack: &Pack, tolerances: &[&str]) -> VirtualRun {
@@ -161,10 +145,10 @@ fn follows(result: &RunResult, id: &str, holds: &impl Fn(&str) -> bool) -> bool 
 fn warnings(sets: &[Vec<&str>], wanted: Wanted) -> String {
     let library = vda5050_tck::library(None).unwrap();
     let pack = library.rules.packs.latest();
-    let requests = sets.iter().map(|set| with(&library, pack, set)).collect();
+    let requests: Vec<_> = sets.iter().map(|set| with(&library, pack, set)).collect();
     let mut worse = String::new();
     let mut warned = String::new();
-    for (set, result) in sets.iter().zip(run_all(&library, pack, requests)) {
+    for (set, result) in sets.iter().zip(run_all(&library, pack, &requests)) {
         let name = set.join(" + ");
         match blemishes(&result, set, wanted) {
             Ok(warnings) => {
@@ -184,7 +168,7 @@ fn warnings(sets: &[Vec<&str>], wanted: Wanted) -> String {
     warned
 }
 
-/// So many sets hold all tolerances. Records of one topic stand side by side, so that those which exclude each other
+/// How many sets all tolerances are spread over. Records of one topic stand side by side, so that those which exclude each other
 /// seldom meet in one set.
 const SETS: usize = 8;
 
@@ -263,7 +247,7 @@ fn a_warning_that_comes_and_goes_hides_no_fault() {
             request.faults = vec![fault.name.to_owned()];
             request
         });
-        let results = run_all(&library, pack, requests.collect());
+        let results = run_all(&library, pack, &requests.collect::<Vec<_>>());
         let missed = faults.iter().zip(&results).filter(|(fault, result)| {
             let all = decided(result);
             let broken = |(decider, verdict): &(Decider, Verdict)| {
@@ -320,7 +304,7 @@ fn with_twenty_seeds_the_verdicts_are_the_same() {
 fn same_verdicts(seeds: std::ops::Range<u64>) {
     let library = vda5050_tck::library(None).unwrap();
     let pack = library.rules.packs.latest();
-    let requests = seeds
+    let requests: Vec<_> = seeds
         .map(|seed| {
             // One of two runs is of a vehicle with its own manners, under the weather of a busy network.
             let mut request = with(&library, pack, if seed % 2 == 0 { &[] } else { &MANNERS });
@@ -344,7 +328,7 @@ fn same_verdicts(seeds: std::ops::Range<u64>) {
         tests.chain(requirements).collect()
     };
     let mut first: Option<Vec<String>> = None;
-    for (seed, result) in run_all(&library, pack, requests).iter().enumerate() {
+    for (seed, result) in run_all(&library, pack, &requests).iter().enumerate() {
         if let Err(worse) = blemishes(result, &MANNERS, Wanted::Everything) {
             panic!("seed {seed}:\n{worse}");
         }

@@ -146,7 +146,7 @@ fn pack(library: &Library, protocol: Option<&str>) -> Result<Arc<Pack>, Problem>
     pack_among(&library.rules.packs, protocol)
 }
 
-/// The same where suites and catalogue are not needed, which take a while to be read.
+/// The pack of a version, where suites and catalogue are not needed, which take a while to be read.
 fn pack_among(packs: &Packs, protocol: Option<&str>) -> Result<Arc<Pack>, Problem> {
     let Some(wanted) = protocol else {
         return Ok(Arc::clone(packs.latest()));

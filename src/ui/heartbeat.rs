@@ -95,7 +95,7 @@ impl Heartbeat {
         self.change(|awaited| awaited.told = Instant::now());
     }
 
-    /// So much of the run is left.
+    /// How much of the run is left.
     pub fn left(&self, left: String) {
         self.change(|awaited| awaited.left = Some(left));
     }

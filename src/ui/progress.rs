@@ -30,7 +30,7 @@ pub struct TestLine {
     pub reason: Option<String>,
 }
 
-/// Who is told. Telling never fails a run: somebody who cannot write swallows it.
+/// Receives what happens in a run. Implementations swallow errors of input and output, since telling never fails a run.
 pub trait Progress {
     /// The run begins.
     fn run_begun(&mut self, title: &RunTitle);

@@ -66,7 +66,7 @@ impl<W: Write, E: Write> Terminal<W, E> {
         }
     }
 
-    /// So much of the run is left; shown with the next test.
+    /// How much of the run is left; shown with the next test.
     pub fn left(&mut self, left: &str) {
         self.left = Some(left.to_owned());
     }

@@ -30,7 +30,7 @@ pub struct LineOptions {
     pub color: bool,
 }
 
-/// See the module.
+/// A watch as plain lines: one for each finding with its message below, and from time to time one for each vehicle.
 pub struct Lines<W: Write, E: Write> {
     findings: Output<W>,
     notes: Output<E>,

@@ -130,7 +130,7 @@ impl Bench {
         self.agv_with(port, &faults)
     }
 
-    /// The same with these arguments.
+    /// A reference AGV in a process of its own, with these arguments.
     pub fn agv_with(&self, port: u16, more: &[&str]) -> Running {
         let broker = format!("mqtt://127.0.0.1:{port}");
         let mut arguments = vec![

@@ -18,7 +18,7 @@ impl Mosquitto {
         Self::start_with(|_| "allow_anonymous true\n".to_owned())
     }
 
-    /// The same with other lines of its configuration, whose files may stand in the folder.
+    /// Starts one with these lines of its configuration, whose files may stand in the folder.
     pub fn start_with(configure: impl Fn(&Path) -> String) -> Option<Self> {
         // mosquitto refuses port 0, so a free one is guessed; another test may be faster, hence several tries.
         for _ in 0..5 {

@@ -1,4 +1,4 @@
-//! The same seed gives the same run.
+//! Two runs with one seed are alike.
 
 use serde_json::Value;
 

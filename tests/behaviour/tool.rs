@@ -207,7 +207,7 @@ impl Running {
         self.end_within(LIMIT)
     }
 
-    /// The same for what takes longer.
+    /// Waits for the end of what takes longer.
     pub fn end_within(mut self, limit: Duration) -> Ended {
         let status = self.wait_within(limit);
         for reader in self.readers.drain(..) {

@@ -29,7 +29,7 @@ impl Answering {
         let topic = if retain { "d/connection" } else { "d/state" }.to_owned();
         out.push(Output::Publish(Publication {
             topic,
-            payload: text.as_bytes().to_vec(),
+            payload: Bytes::copy_from_slice(text.as_bytes()),
             qos: 1,
             retain,
         }));
@@ -45,7 +45,7 @@ impl Device for Answering {
             clean_session: true,
             will: Some(Publication {
                 topic: "d/connection".to_owned(),
-                payload: b"broken".to_vec(),
+                payload: Bytes::from_static(b"broken"),
                 qos: 1,
                 retain: true,
             }),

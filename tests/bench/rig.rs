@@ -7,9 +7,9 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio::sync::mpsc;
 
-use vda5050_tck::bench::Outgoing;
 use vda5050_tck::bench::client::{Client, ClientEvent, ClientOptions};
 use vda5050_tck::bench::endpoint::{Access, Endpoint};
+use vda5050_tck::device::Publication;
 use vda5050_tck::journal::event::{Close, Event, LinkFault, Occurrence, Packet};
 use vda5050_tck::link::Link;
 use vda5050_tck::link::mqtt::{BenchInfo, BenchOptions, MqttBench, MqttLink};
@@ -119,8 +119,8 @@ impl TestDevice {
     }
 }
 
-pub fn message(topic: &str, text: &str, qos: u8, retain: bool) -> Outgoing {
-    Outgoing {
+pub fn message(topic: &str, text: &str, qos: u8, retain: bool) -> Publication {
+    Publication {
         topic: topic.to_owned(),
         payload: Bytes::copy_from_slice(text.as_bytes()),
         qos,

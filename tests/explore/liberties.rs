@@ -3,11 +3,10 @@
 
 use std::fmt::Write as _;
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use vda5050_tck::explore::{Coverage, Exploration, Finding};
 use vda5050_tck::pack::Role;
+use vda5050_tck::qualify::on_all_cores;
 use vda5050_tck::simulate::BuiltIn;
 
 use crate::{grammar, seed};
@@ -56,38 +55,32 @@ fn found(one: &Explored, conversations: usize) -> Vec<Finding> {
 /// What is found that no liberty excuses: a line for each.
 fn accusations(all: &[Explored], conversations: usize) -> String {
     let excused = excused();
-    let next = AtomicUsize::new(0);
-    let accusations = Mutex::new(String::new());
-    std::thread::scope(|scope| {
-        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
-            scope.spawn(|| {
-                while let Some(one) = all.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let found = found(one, conversations);
-                    let known = |finding: &Finding| {
-                        let of = |(liberty, requirement): &(&str, &str)| {
-                            one.liberties.contains(liberty) && *requirement == finding.requirement
-                        };
-                        excused.iter().any(of)
-                    };
-                    for finding in found.iter().filter(|finding| !known(finding)) {
-                        let _ = writeln!(
-                            accusations.lock().unwrap(),
-                            "{} {} with {}, seed {}: {} by {:?}: {} ({})",
-                            finding.verdict.word(),
-                            one.role,
-                            one.liberties.join(" + "),
-                            one.seed,
-                            finding.requirement,
-                            finding.source,
-                            finding.message,
-                            finding.chain.stimuli().join(", "),
-                        );
-                    }
-                }
-            });
+    let of = |one: &Explored| {
+        let mut accusations = String::new();
+        let found = found(one, conversations);
+        let known = |finding: &Finding| {
+            let of = |(liberty, requirement): &(&str, &str)| {
+                one.liberties.contains(liberty) && *requirement == finding.requirement
+            };
+            excused.iter().any(of)
+        };
+        for finding in found.iter().filter(|finding| !known(finding)) {
+            let _ = writeln!(
+                accusations,
+                "{} {} with {}, seed {}: {} by {:?}: {} ({})",
+                finding.verdict.word(),
+                one.role,
+                one.liberties.join(" + "),
+                one.seed,
+                finding.requirement,
+                finding.source,
+                finding.message,
+                finding.chain.stimuli().join(", "),
+            );
         }
-    });
-    accusations.into_inner().unwrap()
+        accusations
+    };
+    on_all_cores(all, of).concat()
 }
 
 /// Explores with all of these; nothing may be found.

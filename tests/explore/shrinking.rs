@@ -12,14 +12,15 @@ use vda5050_tck::pack::Role;
 
 use crate::{found, grammar};
 
-/// So many stimuli more than the shortest conversation known a shrunk one may have.
+/// How many stimuli more than the shortest conversation known a shrunk one may have.
 const ROOM: usize = 2;
 
-/// So many trials shorten one.
+/// How many trials shorten one.
 const TRIALS: usize = 60;
 
-/// So many conversations are drawn for each fault, and so many of those that hold the shortest one are carried out.
+/// How many conversations are drawn for each fault.
 const DRAWN: usize = 300;
+/// How many of those that hold the shortest conversation are carried out.
 const CARRIED_OUT: usize = 8;
 
 /// How much more often the stimuli of the shortest conversation are drawn.

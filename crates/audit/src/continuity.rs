@@ -67,7 +67,7 @@ struct Early {
     orders: BTreeSet<u64>,
 }
 
-/// See the module.
+/// Where messages are missing.
 #[derive(Debug, Default)]
 pub(super) struct Continuity {
     last: BTreeMap<String, (Option<u64>, Moment)>,

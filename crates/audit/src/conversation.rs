@@ -13,7 +13,8 @@ use tck_base::clock::Moment;
 use tck_pack::{Pack, Role};
 use tck_view::MessageView;
 
-/// See the module.
+/// What a vehicle and its master control say to each other, in order: shown to the judge of each side, and where
+/// something is missing between two messages, so that nobody is blamed for a hole in the recording.
 #[derive(Default)]
 pub(super) struct Conversation {
     /// The rules, once the version is known.

@@ -120,7 +120,7 @@ struct Scene<'a> {
     live: bool,
 }
 
-/// See the module.
+/// Judges traffic nobody scripted by the monitors, message after message.
 pub struct Audit<'r> {
     rules: &'r Rules,
     options: Options,

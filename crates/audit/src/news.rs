@@ -38,7 +38,7 @@ pub struct Found {
 /// Whose topic it is.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Address {
-    /// The same for all topics of one vehicle, and for no other.
+    /// Key that all topics of one vehicle share, and no other.
     pub vehicle: String,
     /// Manufacturer; empty where the topic does not say it.
     pub manufacturer: String,

@@ -8,7 +8,7 @@ use tck_judge::Observed;
 /// How many findings wait until the connection is known to be of one vehicle.
 const FOUND: usize = 256;
 
-/// See the module.
+/// What came out of a connection, for the side of the vehicle that it belongs to.
 #[derive(Default)]
 pub(super) struct Outcome {
     /// What was found, and when.

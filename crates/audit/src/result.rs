@@ -282,7 +282,7 @@ impl SideResult {
         }
     }
 
-    /// The same, but that nothing is said to be kept where too little was seen; what is wrong is wrong.
+    /// Takes back that something is kept where too little was seen; what is wrong is wrong.
     #[must_use]
     pub fn unless(mut self, why: Option<&str>) -> Self {
         if let Some(why) = why {

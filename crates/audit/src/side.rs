@@ -66,7 +66,7 @@ impl Apart {
     }
 }
 
-/// See the module.
+/// One side of a vehicle's traffic: what the vehicle says, or what is said to it.
 pub(super) struct Side {
     pub role: Role,
     header: RunHeader,

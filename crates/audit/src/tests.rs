@@ -54,7 +54,7 @@ impl Dice {
     }
 }
 
-/// The same as a bad recorder has it: begun in the middle, one in a hundred lost, one in a hundred twice, and out of
+/// A recording as a bad recorder has it: begun in the middle, one in a hundred lost, one in a hundred twice, and out of
 /// order within 50 milliseconds.
 pub(super) fn spoiled(all: &[Message], seed: u64) -> Vec<Message> {
     let mut dice = Dice(seed);

@@ -22,7 +22,7 @@ pub struct Span {
     pub what: String,
 }
 
-/// See the module; by `connection`, `mode` and `order`.
+/// What a vehicle did over the time of a recording, by `connection`, `mode` and `order`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct TimeLine(pub BTreeMap<&'static str, Vec<Span>>);
 

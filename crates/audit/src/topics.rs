@@ -10,7 +10,7 @@ use tck_pack::Packs;
 /// A topic of a vehicle.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Named {
-    /// The same for all topics of the vehicle.
+    /// Key that all topics of the vehicle share.
     pub key: String,
     /// Manufacturer, if the topic says it.
     pub manufacturer: String,

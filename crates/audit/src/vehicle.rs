@@ -30,7 +30,8 @@ const FIRST_HAND: Duration = Duration::from_secs(60);
 /// How often the version of a vehicle may change; a vehicle that changes it more often is judged by the last one.
 const STRETCHES: usize = 16;
 
-/// See the module.
+/// One vehicle of a recording, with the master control that commands it: what came, in its order, and by which version
+/// of the protocol its [`conversation`](super::conversation) is judged.
 pub(super) struct Vehicle {
     named: Named,
     timed: bool,

@@ -53,7 +53,8 @@ struct Judged {
     outcome: Outcome,
 }
 
-/// See the module.
+/// What is seen of the connections themselves, where packets were captured: the CONNECT with its last will, QoS and
+/// RETAIN as they were published, and how a connection ends.
 #[derive(Default)]
 pub(super) struct Wires {
     open: BTreeMap<u64, Connection>,

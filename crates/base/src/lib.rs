@@ -1,8 +1,10 @@
-//! What everything stands on: time and its limits, verdicts, diagnostics, YAML, patterns, curves and secrets.
+//! What everything stands on: time and its limits, devices as their drivers see them, verdicts, diagnostics, YAML,
+//! patterns, curves and secrets.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
 pub mod clock;
+pub mod device;
 pub mod diagnostic;
 pub mod nurbs;
 pub mod pattern;

@@ -88,7 +88,7 @@ impl Node {
             .map(|(_, value)| value)
     }
 
-    /// What this is, in a user's words: "a text", "a list" ….
+    /// What this is, in a user's words, such as "a text".
     #[must_use]
     pub fn kind_word(&self) -> &'static str {
         match self.kind {

@@ -57,7 +57,7 @@ enum Form {
 /// A line that was read.
 type Line = Option<Vec<u8>>;
 
-/// See the module.
+/// One recording, line by line.
 pub struct Lines {
     reader: Box<dyn BufRead>,
     file: usize,
@@ -436,7 +436,7 @@ fn is_topic(text: &str) -> bool {
     text.split('/').count() > 1 && !text.contains(['#', '+', '{', '"']) && !text.contains("://")
 }
 
-/// The same, where a time may stand before it.
+/// `topic payload`, before which a time may stand.
 fn timed(line: &[u8]) -> Option<(Option<jiff::Timestamp>, &str, &[u8])> {
     if let Some((topic, payload)) = topic_and_payload(line) {
         return Some((None, topic, payload));

@@ -24,7 +24,8 @@ const LARGEST: u64 = 256 << 20;
 /// How many channels are known.
 const CHANNELS: usize = 1 << 16;
 
-/// See the module.
+/// MCAP files, the container that robotics people record into: channels with JSON, in chunks that are packed with zstd,
+/// lz4 or not at all.
 pub struct Mcap {
     reader: Box<dyn BufRead>,
     file: usize,

@@ -19,7 +19,7 @@ struct Source {
     gap: bool,
 }
 
-/// See the module.
+/// Several recordings as one stream, ordered by time.
 pub struct Merged {
     sources: Vec<Source>,
     /// Whether a recording ended behind a gap: what comes next, from another one, comes after the gap.

@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::{CaptureError, Counted, Item, Lines, Mapping, Mcap, Packets, Place, Read, input, mcap, packets};
 
-/// See the module.
+/// One recording, whatever its form.
 pub struct Recorded {
     form: Form,
     /// What was read and given back.

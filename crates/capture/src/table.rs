@@ -9,7 +9,7 @@ use super::{Mapping, Message, Place, clock_text};
 /// What stands between columns.
 const DELIMITERS: [u8; 3] = *b",;\t";
 
-/// See the module.
+/// Tables in CSV: a first line that names the columns, and a message in each row.
 pub(super) struct Table {
     delimiter: u8,
     columns: usize,

@@ -23,7 +23,7 @@ impl Order {
     }
 }
 
-/// See the module.
+/// Texts in UTF-16, as programs on Windows write them, read as UTF-8.
 pub(super) struct Wide<R> {
     raw: R,
     order: Order,

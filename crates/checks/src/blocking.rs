@@ -15,7 +15,7 @@ use tck_world::{Blocking, Fact, Listen, Observation, OrdersSent, Placed, SentOrd
 const ACTIONS: usize = 256;
 const KNOWN: usize = 1024;
 
-/// See the module.
+/// The actions of a node or an edge, held against their blocking types and the sequence of their list.
 pub(super) const BLOCKING: Check = Check {
     name: "action/blocking",
     decides: &["BLOCK-01", "BLOCK-03", "BLOCK-04", "BLOCK-05", "BLOCK-06"],

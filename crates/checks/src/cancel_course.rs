@@ -13,7 +13,7 @@ use tck_world::{Fact, Listen, Observation, Topic, nodes_left};
 /// How many cancellations and actions are looked at.
 const MANY: usize = 256;
 
-/// See the module.
+/// How far a vehicle goes after a cancelOrder, and what it says of it meanwhile.
 pub(super) const COURSE: Check = Check {
     name: "cancel/course",
     decides: &["ORD-CANCEL-02", "ORD-CANCEL-06"],

@@ -17,7 +17,7 @@ const BEHIND: Duration = Duration::from_secs(2);
 /// What a person or a hook has done may end a connection for so long.
 const INFLUENCE: Duration = Duration::from_secs(120);
 
-/// See the module.
+/// A vehicle does not fall over what it is sent.
 pub(super) const STAYS: Check = Check {
     name: "connection/stays",
     decides: &["ORD-REJ-02", "ORD-FLOW-06", "IACT-03"],

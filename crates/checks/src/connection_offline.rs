@@ -16,7 +16,7 @@ const CONNECTIONS: usize = 32;
 /// How long a vehicle that has said OFFLINE may still send states, for what was queued has to go out.
 const LAST_WORDS: Duration = Duration::from_secs(5);
 
-/// See the module.
+/// Who leaves in good order says so before.
 pub(super) const SAYS_OFFLINE: Check = Check {
     name: "connection/says-offline",
     decides: &["CONN-07", "CONN-08"],

@@ -12,7 +12,7 @@ use tck_world::{Fact, Listen, Observation, Topic};
 /// How many actionIds of instant actions are kept in mind.
 const ACTIONS: usize = 256;
 
-/// See the module.
+/// The report of a rejected order stays until a new order is accepted.
 pub(super) const PERSIST: Check = Check {
     name: "errors/persist-until-new-order",
     decides: &["ORD-REJ-03", "ORD-REJ-08"],

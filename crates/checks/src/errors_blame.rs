@@ -12,7 +12,7 @@ use tck_world::{Listen, Observation, Topic};
 /// How many actions, errors and references are looked at.
 const MANY: usize = 256;
 
-/// See the module.
+/// An error that comes with the failure of an action names that action, not another one.
 pub(super) const BLAME: Check = Check {
     name: "errors/blame",
     decides: &["BP-03"],

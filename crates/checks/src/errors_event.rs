@@ -15,7 +15,7 @@ use tck_world::{Listen, Observation, Seen, Topic};
 /// How many errors of a state, and texts of what was sent, are looked at.
 const MANY: usize = 256;
 
-/// See the module.
+/// An error is published when it occurs, not when the clock says so.
 pub(super) const ON_EVENT: Check = Check {
     name: "errors/on-event",
     decides: &["STATE-05"],

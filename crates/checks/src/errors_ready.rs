@@ -7,7 +7,7 @@ use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_view::{SafetyState, StateView};
 use tck_world::{End, Listen, Observation, Topic};
 
-/// See the module.
+/// A vehicle that only warns is ready to start.
 pub(super) const READY: Check = Check {
     name: "errors/ready-under-warning",
     decides: &["ERR-03"],

@@ -30,7 +30,7 @@ pub(super) const LIMITS: Check = Check {
 /// How many elements of a list are looked at.
 const ELEMENTS: usize = 256;
 
-/// See the module.
+/// What a schema cannot say about a factsheet.
 pub(super) const CONSISTENCY: Check = Check {
     name: "factsheet/consistency",
     decides: &["FACT-04", "FACT-08", "FACT-09"],

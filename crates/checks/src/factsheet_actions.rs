@@ -13,7 +13,7 @@ use tck_world::{Listen, Observation, Topic};
 /// How many elements of a list are looked at.
 const ELEMENTS: usize = 512;
 
-/// See the module.
+/// A factsheet calls what the text defines by the names of the text.
 pub(super) const PREDEFINED: Check = Check {
     name: "factsheet/predefined-actions",
     decides: &["ACT-05", "ACT-06"],

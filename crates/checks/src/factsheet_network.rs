@@ -7,7 +7,7 @@ use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_view::{FactsheetView, VehicleConfig};
 use tck_world::{Listen, Observation, Topic};
 
-/// See the module.
+/// The network data of a vehicle in operation stay what they are.
 pub(super) const NETWORK: Check = Check {
     name: "factsheet/network",
     decides: &["FACT-10"],

@@ -5,7 +5,7 @@ use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_pack::Role;
 use tck_world::{Listen, Observation, Seen, Topic};
 
-/// See the module.
+/// Of each vehicle all topics are heard, and not some of them only.
 pub(super) const EACH_HEARD: Check = Check {
     name: "fleet/each-heard",
     decides: &["TOPIC-14"],

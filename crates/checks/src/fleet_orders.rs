@@ -8,7 +8,7 @@ use tck_journal::event::Event;
 use tck_view::OrderView;
 use tck_world::{Listen, Observation, Topic};
 
-/// See the module.
+/// An order goes on where it was begun.
 pub(super) const OWN_ORDERS: Check = Check {
     name: "fleet/own-orders",
     decides: &["TOPIC-13"],

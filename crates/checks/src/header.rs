@@ -18,7 +18,7 @@ use tck_world::{Listen, Observation};
 /// How far the clock of a device may be off before it is remarked on.
 const CLOCK_TOLERANCE: Duration = Duration::from_secs(300);
 
-/// So long a time may be the same in all messages of a topic.
+/// How long a time may be the same in all messages of a topic.
 const STANDING: Duration = Duration::from_secs(5);
 /// Time zones are whole half hours apart, but for a few; a clock is right to so many seconds.
 const HALF_HOUR: u64 = 1800;

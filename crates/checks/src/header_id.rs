@@ -11,7 +11,7 @@ use tck_pack::{HookEffect, HookInfo, Role};
 use tck_view::{Header, Member, Number};
 use tck_world::{Listen, Observation, Topic};
 
-/// See the module.
+/// `headerId` counts every message of a topic.
 pub(super) const ID_RISES: Check = Check {
     name: "header/id-rises",
     decides: &["HDR-02"],

@@ -16,7 +16,7 @@ const ACTIONS: usize = 256;
 /// Who waited less may just have been slow.
 const WAITED: Duration = Duration::from_millis(500);
 
-/// See the module.
+/// What is only asked for does not wait until something else is done.
 pub(super) const NOT_QUEUED: Check = Check {
     name: "instant/not-queued",
     decides: &["IACT-05"],

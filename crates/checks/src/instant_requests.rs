@@ -12,7 +12,7 @@ use tck_world::{Fact, Listen, Observation, Seen, Topic};
 /// How many requests are kept in mind.
 const REQUESTS: usize = 64;
 
-/// See the module.
+/// Who is asked for a state or a factsheet publishes it, whatever else it does.
 pub(super) const REQUESTS_MET: Check = Check {
     name: "instant/requests",
     decides: &["ACT-26", "ACT-40"],

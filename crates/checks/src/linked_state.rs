@@ -22,7 +22,7 @@ const BESIDE: (f64, f64) = (0.5, 0.35);
 /// What a person or a hook has done may hold for so long.
 const INFLUENCE: Duration = Duration::from_secs(120);
 
-/// See the module.
+/// What the table of predefined actions links to an action is so in the state that reports its end.
 pub(super) const LINKED_STATE: Check = Check {
     name: "action/linked-state",
     decides: &[

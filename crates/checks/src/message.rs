@@ -86,7 +86,7 @@ pub(super) const ENCODING: Check = Check {
 struct Schema {
     /// The member names of each topic's messages.
     members: BTreeMap<String, Vec<String>>,
-    /// What is inside of messages.
+    /// The member names of what is inside of messages, by topic and path.
     inner: Vec<Inner>,
     /// What the version calls the members of [`OF_ORDER`].
     of_order: Vec<String>,

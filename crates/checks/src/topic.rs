@@ -124,7 +124,7 @@ const LOOKS: [(Topic, [Field; 2]); 3] = [
     ),
     (Topic::Connection, [ConnectionView::connection_state, Header::header_id]),
 ];
-/// So long a device may publish elsewhere before it does on the topic of the name.
+/// How long a device may publish elsewhere before it does on the topic of the name.
 const ELSEWHERE: Duration = Duration::from_secs(30);
 
 /// The topic on which such a message belongs.

@@ -75,7 +75,7 @@ impl Trace {
         Self::new("subscriber", Role::MasterControl)
     }
 
-    /// The same seen at the tap.
+    /// A run with a master control under test, seen at the tap.
     pub fn master_control_at_tap() -> Self {
         Self::new("tap", Role::MasterControl)
     }

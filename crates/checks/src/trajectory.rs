@@ -59,7 +59,7 @@ const ORDERS: usize = 32;
 const SAME: f64 = 0.2;
 /// How far the end of a curve may be from its node, in metres.
 const END: f64 = 0.5;
-/// The same at its start.
+/// How far the start of a curve may be from its node, in metres.
 const START: f64 = 1.0;
 
 /// The edges of a state for which a trajectory is reported, with their sequenceIds.

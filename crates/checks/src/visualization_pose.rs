@@ -16,14 +16,14 @@ use tck_world::{Fact, Listen, Observation, Topic};
 const BESIDE: f64 = 0.5;
 /// What comes so soon after a state may have been sent before it.
 const OVERTAKING: Duration = Duration::from_millis(500);
-/// So many metres from the origin, millimetres cannot be taken for metres.
+/// How far from the origin, in metres, millimetres cannot be taken for metres.
 const FROM_ORIGIN: f64 = 0.5;
-/// So far, in metres, no vehicle gets and comes back between two states; ten times the way between them is added.
+/// How far, in metres, no vehicle gets and comes back between two states; ten times the way between them is added.
 const OUT_OF_REACH: f64 = 100.0;
 /// How many visualizations wait for the next state.
 const WAITING: usize = 64;
 
-/// See the module.
+/// The visualization says where the vehicle is, as the state does.
 pub(super) const POSITION: Check = Check {
     name: "visualization/position",
     decides: &["VIS-01", "MAP-02"],

@@ -231,7 +231,7 @@ impl Layout {
         Self::assemble(nodes, edges, Vec::new())
     }
 
-    /// The same layout with these nodes only.
+    /// Keeps these nodes only.
     ///
     /// # Errors
     /// When a node of the list is not in the layout.
@@ -262,7 +262,7 @@ impl Layout {
         }
     }
 
-    /// The same layout with no edge faster than `cap`, in m/s.
+    /// Lets no edge be faster than `cap`, in m/s.
     #[must_use]
     pub fn slower_than(mut self, cap: f64) -> Self {
         for edge in self.edges.values_mut() {
@@ -271,7 +271,7 @@ impl Layout {
         self
     }
 
-    /// The same layout for a line-guided vehicle: every edge says by the points of the compass where it leaves.
+    /// Makes it a layout for a line-guided vehicle: every edge says by the points of the compass where it leaves.
     #[must_use]
     pub fn with_directions(mut self) -> Self {
         const COMPASS: [&str; 8] = ["E", "NE", "N", "NW", "W", "SW", "S", "SE"];
@@ -287,7 +287,7 @@ impl Layout {
         self
     }
 
-    /// The same layout without edges that do not say their direction.
+    /// Leaves out edges that do not say their direction.
     #[must_use]
     pub fn directed(mut self) -> Self {
         self.edges.retain(|_, edge| edge.direction.is_some());

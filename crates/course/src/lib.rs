@@ -122,7 +122,7 @@ pub enum CourseError {
     UnknownNode {
         /// The id.
         id: String,
-        /// Did you mean …
+        /// What may have been meant.
         hint: String,
     },
     /// The vehicle stands on no node.

@@ -25,7 +25,7 @@ pub(super) struct Stop {
 }
 
 impl Layout {
-    /// The same layout with the places of these actions. Courses avoid them where they can.
+    /// Adds the places of these actions, which courses avoid where they can.
     #[must_use]
     pub fn with_stations(mut self, actions: &SampleActions) -> Self {
         for (kind, action) in actions.iter() {

@@ -11,9 +11,9 @@ use super::ids::IdForm;
 use super::route::{RouteBuilder, SentOrders};
 use super::unmade::ComposeError;
 use tck_base::clock::Stamp;
+use tck_base::device::Publication;
 use tck_base::pattern::Bindings;
 use tck_judge::Ground;
-use tck_net::bench::Outgoing;
 use tck_suite::model::{Patch, Raw, Send, SendAction};
 use tck_view::{FactsheetView, OfferedAction, OrderView};
 
@@ -21,7 +21,7 @@ use tck_view::{FactsheetView, OfferedAction, OrderView};
 #[derive(Debug)]
 pub struct Composed {
     /// The message.
-    pub message: Outgoing,
+    pub message: Publication,
     /// Name and actionId.
     pub actions: Vec<(String, String)>,
 }
@@ -93,7 +93,7 @@ impl Composer {
             message.to_string().into_bytes()
         };
         Ok(Composed {
-            message: Outgoing {
+            message: Publication {
                 topic,
                 payload: payload.into(),
                 qos,
@@ -110,7 +110,7 @@ impl Composer {
         members: Value,
         ground: &Ground,
         now: Stamp,
-    ) -> Result<Outgoing, ComposeError> {
+    ) -> Result<Publication, ComposeError> {
         let full = ground
             .topics
             .get(topic)
@@ -120,7 +120,7 @@ impl Composer {
         if let Value::Object(members) = members {
             message.extend(members);
         }
-        Ok(Outgoing {
+        Ok(Publication {
             topic: full,
             payload: Value::Object(message).to_string().into_bytes().into(),
             qos: ground.pack.topic(topic).map_or(0, |rule| rule.qos),

@@ -21,16 +21,17 @@ const FOR_EACH_VEHICLE: u64 = 100;
 /// longest run against a vehicle that talks as fast as it may takes a third.
 const MEMORY: u64 = 3 << 30;
 
-/// What clients that are not the device may do in the same time before what they do is left out of the journal …
+/// How many records of clients that are not the device are kept within [`WINDOW`]; more are left out of the journal.
 const OF_OTHERS: u64 = 2_000;
-/// … and before the run ends, because it cannot be left out.
+/// How many records of clients that are not the device may come within [`WINDOW`]: where they cannot be left out, the run
+/// ends by more.
 const OF_OTHERS_AT_MOST: u64 = 30_000;
 
 /// Counts what comes from the device, and what is held of it.
 #[derive(Debug)]
 pub struct FloodGuard {
     device: Recent,
-    /// The same of clients that are not the device.
+    /// What comes from clients that are not the device.
     others: Recent,
     vehicles: u64,
     /// About how many bytes of memory the records take, and how many they may take.

@@ -208,7 +208,8 @@ impl<L: Link, O: Operator> Engine<L, O> {
         self.hook_for(name, parameters, (abandons, None), None).await
     }
 
-    /// The same for one of all mock AGVs, given up after a time if one is named.
+    /// Runs a hook of the profile as [`Self::hook`] does, for one of all mock AGVs, and gives it up after a time if one is
+    /// named.
     async fn hook_for(
         &mut self,
         name: &str,

@@ -16,7 +16,7 @@ pub enum IdForm {
     /// Run, number and name.
     #[default]
     Readable,
-    /// So many digits, at most.
+    /// Digits, and how many at most.
     Digits(usize),
 }
 

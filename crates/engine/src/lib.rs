@@ -29,9 +29,10 @@ pub use recorder::{RecordError, Recorder};
 pub use unmade::ComposeError;
 
 use tck_base::clock::Moment;
+use tck_base::device::Publication;
 use tck_journal::event::{Event, Occurrence, Payload, StepEnd};
 use tck_judge::{JudgeError, Progress, Sign, TestJudge};
-use tck_net::bench::{LinkError, Offer, Outgoing};
+use tck_net::bench::{LinkError, Offer};
 use tck_net::link::Link;
 use tck_pack::HookEffect;
 use tck_suite::model::{Purpose, Section, Step, Test, Verb};
@@ -406,7 +407,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
     }
 
     /// Publishes a message of the harness, journal first.
-    pub async fn publish(&mut self, message: Outgoing) -> Result<(), EngineError> {
+    pub async fn publish(&mut self, message: Publication) -> Result<(), EngineError> {
         let is_order = self.recorder.judge().ground().topics.get("order") == Some(&message.topic);
         if is_order {
             self.space_orders().await?;

@@ -33,7 +33,7 @@ impl Chain {
         &self.0
     }
 
-    /// The same up to a stimulus, counted from zero, and with it.
+    /// The chain up to a stimulus, counted from zero, and with it.
     #[must_use]
     pub fn until(&self, at: usize) -> Self {
         Self(self.0.iter().take(at + 1).cloned().collect())

@@ -89,7 +89,7 @@ pub struct Shown {
     pub shows: (usize, usize),
 }
 
-/// So often a shrunk conversation is carried out, to see whether it always fails.
+/// How often a shrunk conversation is carried out, to see whether it always fails.
 const ATTEMPTS: usize = 3;
 
 impl Exploration {

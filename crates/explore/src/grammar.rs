@@ -255,7 +255,7 @@ impl Grammar {
         &self.explore
     }
 
-    /// The same as a role.
+    /// The role of the side it is for.
     #[must_use]
     pub fn role(&self) -> Role {
         if self.explore == Role::MasterControl.word() {

@@ -11,8 +11,8 @@ use tck_suite::model::BrokenMember;
 const PATCH: &str = "${break.patch}";
 
 impl Grammar {
-    /// The same without the stimuli that a protocol version does not have, and those `keeps` refuses. A stimulus that stands
-    /// for many breakages has become as many.
+    /// Leaves out the stimuli that a protocol version does not have, and those `keeps` refuses. A stimulus that stands for
+    /// many breakages becomes as many.
     #[must_use]
     pub fn only(mut self, pack: &Pack, keeps: impl Fn(&str, &Stimulus) -> bool) -> Self {
         self.stimuli.retain(|name, stimulus| {
@@ -27,8 +27,7 @@ impl Grammar {
     }
 }
 
-/// The same stimuli, in which each that stands for many has become as many. As a family they are drawn as often as the one
-/// they came from.
+/// Makes each stimulus that stands for many into as many. As a family they are drawn as often as the one they came from.
 fn unfolded(stimuli: BTreeMap<String, Stimulus>, pack: &Pack) -> BTreeMap<String, Stimulus> {
     let families: Vec<(u32, Vec<(String, Stimulus)>)> = stimuli
         .into_iter()

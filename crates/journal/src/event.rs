@@ -6,12 +6,12 @@
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-pub use super::direction::Direction;
 pub use super::fault::LinkFault;
 pub use super::packet::{Close, Filter, Packet, Will};
 pub use super::payload::{PAYLOAD_LIMIT, PAYLOAD_PREFIX, Payload, hex};
 pub use super::plan::{Capability, Gate, MockVehicle, Plan, PlannedTest, RunHeader, Setting};
 pub use super::program::{Ending, Origin, Program};
+pub use super::vantage::Direction;
 pub use super::waiver::{Reading, Waiver};
 use tck_base::clock::Stamp;
 

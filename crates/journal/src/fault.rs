@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::direction::Direction;
+use super::vantage::Direction;
 
 /// What the harness does to the link.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -5,7 +5,6 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
-mod direction;
 pub mod event;
 mod fault;
 pub mod file;

@@ -146,7 +146,7 @@ pub enum Reason {
         /// The test that failed.
         test: String,
     },
-    /// The same precondition was not reached in several tests before.
+    /// Several tests before did not reach this precondition.
     SetAside {
         /// File and line of the precondition.
         place: String,

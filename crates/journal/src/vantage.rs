@@ -1,7 +1,9 @@
-//! From where the harness can see.
+//! From where the harness can see, and which way something goes before its eyes.
+
+use serde::{Deserialize, Serialize};
 
 /// From where the harness can see.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Vantage {
     /// Every packet of the device.
@@ -19,4 +21,14 @@ impl Vantage {
             Self::Subscriber => "subscriber",
         }
     }
+}
+
+/// Which way something went, seen from the harness.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Direction {
+    /// From the device under test.
+    FromDevice,
+    /// To the device under test.
+    ToDevice,
 }

@@ -14,7 +14,7 @@ use tck_view::{Names, Topic};
 const LONGEST: Duration = Duration::from_secs(31);
 /// A silence below it is none.
 const SHORTEST: Duration = Duration::from_secs(5);
-/// So many usual periods without a word are a silence.
+/// How many usual periods without a word are a silence.
 const PERIODS: u32 = 3;
 /// For so long, and so often, a device is listened to before it is known how long it is silent.
 const LEARNED: Duration = Duration::from_secs(65);

@@ -21,7 +21,7 @@ use tck_view::{ActionState, EdgeState, Field, Member, Names, Node, NodeState, Nu
 const TOPIC: &str = "state";
 /// A state with more bytes is shown to a check as it is.
 const LARGEST: usize = 64 << 10;
-/// So many earlier states are asked what was shown last.
+/// How many earlier states are asked what was shown last.
 const LOOK_BACK: usize = 100;
 /// Two places no farther apart, in metres, are one.
 const SAME_PLACE: f64 = 0.01;

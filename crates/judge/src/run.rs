@@ -406,7 +406,8 @@ pub(super) fn interrupted(entry: &Entry) -> Arc<str> {
     format!("the run was interrupted (#{})", entry.seq()).into()
 }
 
-/// What shows nothing in a test: what was found in it, and what is known from before.
+/// Members of the states that monitors found unreliable in a test, or that are known to be so from before: what is
+/// asserted on them is inconclusive.
 fn hidden(watches: &Watches, waivers: &[Waiver]) -> Vec<Hidden> {
     let mut all = watches.hidden();
     let kept = waivers.iter().filter(|waiver| waiver.reading == Reading::Kept);

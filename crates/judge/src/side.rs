@@ -15,7 +15,7 @@ use tck_journal::Entry;
 use tck_journal::event::{Event, RunHeader};
 use tck_suite::model::Monitor;
 
-/// See the module.
+/// One side of recorded traffic, judged by monitors alone.
 pub struct SideJudge {
     ground: Ground,
     timeline: Timeline,
@@ -50,7 +50,7 @@ impl SideJudge {
         })
     }
 
-    /// The same for the journal of a run, which tells who is on the tap besides the device: what bystanders do is not judged.
+    /// Leaves unjudged what bystanders do: the journal of a run tells who is on the tap besides the device.
     #[must_use]
     pub fn among_others(mut self, header: &RunHeader) -> Self {
         self.company = Some(Company::of(self.ground.role, header, &self.ground.pack));

@@ -14,7 +14,7 @@ use tck_journal::event::Event;
 use tck_pack::{Pack, Role};
 use tck_view::{ErrorView, Header, Member, MessageView, Names, StateView, Topic};
 
-/// So many ids of a topic are looked for.
+/// How many ids of a topic are looked for.
 const KEPT: usize = 64;
 
 /// A new error so soon after a message is about it.

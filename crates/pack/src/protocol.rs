@@ -14,7 +14,7 @@ use super::{AssetFile, Assets, MessageSchema, Role, Version};
 use tck_base::diagnostic::{Diagnostic, Source};
 use tck_base::yaml;
 
-/// Name of a topic of the protocol, the last level of the MQTT topic: `order`, `state` ….
+/// Name of a topic of the protocol, the last level of the MQTT topic, such as `order`.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct TopicName(Arc<str>);

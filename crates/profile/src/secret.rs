@@ -125,7 +125,7 @@ impl SecretText {
         })
     }
 
-    /// The same with other texts; secrets stay as they are.
+    /// Writes its texts otherwise; secrets stay as they are.
     #[must_use]
     pub(super) fn with_texts(&self, write: impl Fn(&str) -> String) -> Self {
         let parts = self.0.iter().map(|part| match part {

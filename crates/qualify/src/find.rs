@@ -13,7 +13,7 @@ use tck_reference::Fault;
 use tck_simulate::BuiltIn;
 use tck_suite::model::Test;
 
-/// So many tests are tried before it is looked whether one of them has found the fault.
+/// How many tests are tried before it is looked whether one of them has found the fault.
 const FEW: usize = 3;
 
 /// Whether a requirement the fault names was reported, and the device failed. A lapse need only warn.

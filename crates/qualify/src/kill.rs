@@ -1,10 +1,9 @@
 //! What one fault fails, and how a run with it is made.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::decider::{Decider, decided_in};
+use super::parallel::on_all_cores;
 use tck_base::verdict::Verdict;
 use tck_engine::EngineError;
 use tck_judge::Library;
@@ -149,26 +148,7 @@ pub(super) fn each(
     faults: &[Fault],
     attempt: impl Fn(&Fault) -> Result<Kill, EngineError> + Sync,
 ) -> Result<Vec<Kill>, EngineError> {
-    let next = AtomicUsize::new(0);
-    let kills: Mutex<Vec<(usize, Result<Kill, EngineError>)>> = Mutex::new(Vec::new());
-    let workers = std::thread::available_parallelism().map_or(1, usize::from);
-    std::thread::scope(|scope| {
-        for _ in 0..workers {
-            scope.spawn(|| {
-                loop {
-                    let at = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(fault) = faults.get(at) else { break };
-                    let kill = attempt(fault);
-                    if let Ok(mut all) = kills.lock() {
-                        all.push((at, kill));
-                    }
-                }
-            });
-        }
-    });
-    let mut kills = kills.into_inner().unwrap_or_default();
-    kills.sort_by_key(|(at, _)| *at);
-    kills.into_iter().map(|(_, kill)| kill).collect()
+    on_all_cores(faults, attempt).into_iter().collect()
 }
 
 /// Adds what more was found with the same faults.

@@ -12,6 +12,7 @@ mod find;
 mod kill;
 mod matrix;
 mod outcome;
+mod parallel;
 mod rest;
 
 use std::collections::BTreeSet;
@@ -20,6 +21,7 @@ use std::sync::Arc;
 pub use decider::{Decider, decided};
 pub use kill::Kill;
 pub use outcome::Qualification;
+pub use parallel::on_all_cores;
 
 use self::decider::{blemishes_of, decided_in};
 use self::kill::{Grounds, Vehicle, each};

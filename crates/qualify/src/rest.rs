@@ -13,7 +13,7 @@ use tck_reference::Fault;
 use tck_suite::Exceptions;
 use tck_suite::model::Test;
 
-/// So many faults are tried before it is looked again what is still unproven.
+/// How many faults are tried before it is looked again what is still unproven.
 const CHUNK: usize = 12;
 
 /// What there is to prove, and on what.

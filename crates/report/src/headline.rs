@@ -14,7 +14,7 @@ const VALUE: usize = 36;
 /// Most list members named in a headline.
 const MEMBERS: usize = 3;
 
-/// The last level of the topic of a message: `state`, `order`, …
+/// The last level of the topic of a message, such as `state`.
 #[must_use]
 pub fn topic(entry: &Entry) -> Option<String> {
     let (Event::Message { topic, .. }
@@ -30,7 +30,7 @@ pub fn topic(entry: &Entry) -> Option<String> {
     Some(short(&line(topic.rsplit('/').next().unwrap_or(topic)), VALUE).into_owned())
 }
 
-/// `state`, `CONNECT`, `link` …: what kind of record it is, in one word or two.
+/// What kind of record it is, in one word or two, such as `state`, `CONNECT` or `link`.
 #[must_use]
 pub fn kind(entry: &Entry) -> String {
     if let Some(topic) = topic(entry) {

@@ -30,7 +30,7 @@ struct Issue<'a> {
 }
 
 impl Issue<'_> {
-    /// The same for the same mistake in every run, whatever was seen around it.
+    /// Names the mistake, alike in every run, whatever was seen around it.
     fn fingerprint(&self) -> String {
         let what = format!("{}\n{}\n{}", self.requirement, self.by, self.place.0);
         hex(&Sha256::digest(what))

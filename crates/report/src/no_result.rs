@@ -28,7 +28,7 @@ pub struct NoResult {
 pub struct Obstacle {
     /// What it is, in one line.
     pub title: String,
-    /// The same with place and hint, as the terminal shows it.
+    /// The title with place and hint, as the terminal shows it.
     pub text: String,
     /// File and line, where it stands in one.
     pub place: Option<(String, usize)>,

@@ -11,7 +11,7 @@ use tck_net::link::Link;
 use tck_pack::{HookEffect, HookInfo};
 use tck_profile::show_duration;
 
-/// So often a device is switched on before it is given up.
+/// How often a device is switched on before it is given up.
 const STARTS: usize = 2;
 
 impl<L: Link, O: Operator> Session<'_, L, O> {

@@ -28,9 +28,11 @@ pub(super) const GOODBYE_LIMIT: Duration = Duration::from_secs(20);
 const KILL_LIMIT: Duration = Duration::from_secs(5);
 /// How often it is looked whether anything of a group is left.
 const GLANCE: Duration = Duration::from_millis(20);
-/// So much of the end of its log is read, so many lines are kept of it, and so many characters.
+/// How many bytes of the end of its log are read.
 const READ: u64 = 4 << 10;
+/// How many lines are kept of what was read.
 const LINES: usize = 5;
+/// How many characters are kept of these lines.
 const SHOWN: usize = 500;
 
 /// Says something to whoever looks on, at once.

@@ -22,7 +22,7 @@ use tck_world::rest::{has_order, place};
 /// A vehicle that is no farther from its node, in metres, stands on it.
 const ON_NODE: f64 = 0.05;
 
-/// So many transports left over from a test are let pass before the next one.
+/// How many transports left over from a test are let pass before the next one.
 const LEFTOVERS: usize = 3;
 
 /// A master control that acts on a state does so within this part of `time.settle`.

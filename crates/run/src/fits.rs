@@ -84,7 +84,7 @@ fn spelled(operation: &Term) -> Option<(usize, bool)> {
     written(path, member("value")?)
 }
 
-/// The same of a value under a name or at the end of a path.
+/// The length at most, and whether there are digits only, of an id under a name or at the end of a path.
 fn written(name: &str, value: &TermKind) -> Option<(usize, bool)> {
     let TermKind::Text(pieces) = value else {
         return None;

@@ -28,7 +28,7 @@ fn last_order_never_showed(judge: &RunJudge, since: Moment) -> bool {
         })
 }
 
-/// So often in a row the whole ladder is tried before only a moment is given.
+/// How often in a row the whole ladder is tried before only a moment is given.
 const WHOLE_LADDERS: u32 = 3;
 
 impl<L: Link, O: Operator> Session<'_, L, O> {

@@ -25,7 +25,7 @@ pub(super) struct Idle {
     pub(super) answered: bool,
     /// Since when it was left alone.
     pub(super) since: Moment,
-    /// So long something that is about to end may take.
+    /// How long something that is about to end may take.
     pub(super) patience: Duration,
     /// When the last test began.
     pub(super) test: Moment,

@@ -230,7 +230,7 @@ impl SocketRun {
         }
     }
 
-    /// The same on this thread until it is over, with nobody watching and without a bundle.
+    /// Carries the run out on this thread until it is over, with nobody watching and without a bundle.
     ///
     /// # Errors
     /// When it cannot begin.

@@ -9,9 +9,9 @@ use tokio::process::{Child, Command};
 
 use tck_engine::HookOutcome;
 
-/// So much of what a program prints is kept; the rest is read and forgotten.
+/// How much of what a program prints is kept; the rest is read and forgotten.
 const KEPT: usize = 8 << 10;
-/// So many characters of it are shown.
+/// How many characters of it are shown.
 const SHOWN: usize = 500;
 /// How long is waited for the rest of the output once the program has ended: what it left running may hold the pipe open.
 const LAST_WORDS: Duration = Duration::from_millis(200);

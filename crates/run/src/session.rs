@@ -99,7 +99,7 @@ pub trait Progress: Watcher {
     fn test_ended(&mut self, result: &TestResult);
     /// Something worth knowing.
     fn note(&mut self, text: &str);
-    /// So much of the run is left, as far as can be told now.
+    /// How much of the run is left, as far as can be told now.
     fn left(&mut self, left: Duration) {
         let _ = left;
     }

@@ -1,11 +1,11 @@
-//! The same breakage again and again: after a few tests the rest of its kind is set aside as one group.
+//! Sets aside, as one group, the tests behind a precondition that several tests did not reach.
 
 use std::collections::BTreeMap;
 
 use tck_journal::Reason;
 use tck_suite::model::{Section, Test};
 
-/// So many tests in a row may fail at the same place.
+/// How many tests in a row may fail at the same place.
 const STRIKES: usize = 3;
 
 /// Preconditions that were not reached, by the place in the suites where they are written.

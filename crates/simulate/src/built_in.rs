@@ -6,14 +6,13 @@ use serde_json::{Map, Value};
 
 use super::driver::RunningDevice;
 use super::fleet::Fleet;
-use super::peer::DevicePeer;
 use super::reference_agv::ReferenceAgv;
 use super::reference_master_control::ReferenceMasterControl;
 use super::unknown::UnknownName;
 use tck_base::clock::WallClock;
+use tck_base::device::Device;
 use tck_course::Layout;
 use tck_net::bench::endpoint::Endpoint;
-use tck_net::link::memory::Peer;
 use tck_pack::Participant;
 use tck_pack::Role;
 use tck_profile::TimeLimits;
@@ -186,17 +185,15 @@ impl BuiltIn {
     ///
     /// # Errors
     /// When there is no fault of such a name.
-    pub fn peer(&self, faults: &[&str]) -> Result<Box<dyn Peer>, UnknownName> {
+    pub fn peer(&self, faults: &[&str]) -> Result<Box<dyn Device>, UnknownName> {
         Ok(match self {
             Self::Agv(device) => {
                 let agv = vehicles::built(device.config.clone(), faults);
-                Box::new(DevicePeer(agv.map_err(|unknown| UnknownName(unknown.to_string()))?))
+                Box::new(agv.map_err(|unknown| UnknownName(unknown.to_string()))?)
             }
             Self::MasterControl(device) => {
                 let master_control = deviations::built(device.config.clone(), &device.liberties, faults);
-                Box::new(DevicePeer(
-                    master_control.map_err(|unknown| UnknownName(unknown.to_string()))?,
-                ))
+                Box::new(master_control.map_err(|unknown| UnknownName(unknown.to_string()))?)
             }
         })
     }
@@ -221,9 +218,9 @@ impl BuiltIn {
     }
 
     /// The mock AGVs, for a bench in memory.
-    pub fn mock_peers(&self) -> impl Iterator<Item = Box<dyn Peer>> {
+    pub fn mock_peers(&self) -> impl Iterator<Item = Box<dyn Device>> {
         let vehicles = self.fleet().into_iter().flat_map(|fleet| &fleet.vehicles);
-        vehicles.map(|vehicle| Box::new(DevicePeer(mock(vehicle.config.clone()))) as Box<dyn Peer>)
+        vehicles.map(|vehicle| Box::new(mock(vehicle.config.clone())) as Box<dyn Device>)
     }
 }
 

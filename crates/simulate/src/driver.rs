@@ -13,14 +13,12 @@ use tokio::task::JoinHandle;
 use tokio::time::{Instant, sleep_until};
 
 use super::fetching::{Progress, fetch};
-use super::peer::outgoing;
 use super::witness::{Witness, report};
 use tck_base::clock::{Moment, WallClock};
-use tck_net::bench::Outgoing;
+use tck_base::device::{Device, Input, Output, Publication};
 use tck_net::bench::client::{Client, ClientEvent, ClientOptions};
 use tck_net::bench::endpoint::Endpoint;
 use tck_net::link::mqtt::Reporter;
-use tck_reference::{Device, Input, Output, Publication};
 
 /// A device that wants to be woken again and again at the same moment gets on in steps of this.
 const LEAST_WAKE: Duration = Duration::from_millis(1);
@@ -133,7 +131,7 @@ struct Driver<D> {
     told: Option<oneshot::Sender<Result<(), String>>>,
     connection: Option<(Client, mpsc::Receiver<ClientEvent>)>,
     client_id: String,
-    will: Option<Outgoing>,
+    will: Option<Publication>,
     established: bool,
     downloads: mpsc::UnboundedSender<Progress>,
 }
@@ -251,7 +249,7 @@ impl<D: Device> Driver<D> {
     fn connect(&mut self) {
         let options = self.device.connect_options(self.clock.now());
         self.client_id = self.endpoint.client_id.clone().unwrap_or(options.client_id);
-        self.will = options.will.map(outgoing);
+        self.will = options.will;
         self.established = false;
         self.connection = Some(Client::open(&ClientOptions {
             endpoint: self.endpoint.clone(),
@@ -263,11 +261,10 @@ impl<D: Device> Driver<D> {
         }));
     }
 
-    async fn publish(&mut self, publication: Publication) {
+    async fn publish(&mut self, message: Publication) {
         let Some((client, _)) = self.connection.as_ref().filter(|_| self.established) else {
             return;
         };
-        let message = outgoing(publication);
         if let Some(reporter) = &self.sent {
             report(reporter, &message).await;
         }

@@ -6,9 +6,9 @@ use std::time::Duration;
 use bytes::Bytes;
 use tokio::sync::mpsc;
 
+use tck_base::device::Download;
 use tck_net::bench::web;
 use tck_net::maps::FETCH_TIMEOUT;
-use tck_reference::Download;
 
 /// Largest file a device fetches.
 const LARGEST_FILE: u64 = 256 << 20;

@@ -24,7 +24,7 @@ pub struct Fleet {
 }
 
 impl Fleet {
-    /// So many vehicles on the floor of `like`, spread over its nodes. The serial numbers are those given, and then
+    /// `count` vehicles on the floor of `like`, spread over its nodes. The serial numbers are those given, and then
     /// made up.
     #[must_use]
     pub fn new(like: &ReferenceAgv, manufacturer: &str, serials: &[String], count: usize, pack: &Pack) -> Self {
@@ -157,7 +157,7 @@ impl Fleet {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Leavings {
     own: Vec<String>,
-    /// The same with `+` for the serial number.
+    /// These topics as filters, with `+` for the serial number.
     filters: Vec<String>,
 }
 

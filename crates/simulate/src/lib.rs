@@ -10,7 +10,6 @@ pub mod driver;
 mod fetching;
 mod fleet;
 mod hook_server;
-mod peer;
 mod reference_agv;
 mod reference_master_control;
 mod running_fleet;

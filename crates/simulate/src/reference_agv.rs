@@ -197,7 +197,7 @@ impl ReferenceAgv {
         }
     }
 
-    /// The same vehicle as other vehicles are, so that what only applies to them is proven as well, and so that nobody
+    /// Every kind of vehicle, so that what only applies to some is proven as well, and so that nobody
     /// is blamed for what they need not have. The usual one is the first.
     #[must_use]
     pub fn variants(pack: &Pack) -> Vec<Self> {
@@ -291,8 +291,8 @@ impl ReferenceAgv {
         self.actions.bindings()
     }
 
-    /// The same vehicle in a hurry, for runs over real sockets, where every metre costs time: as fast as tests that
-    /// have to catch it between two nodes allow.
+    /// Makes the vehicle hurry, for runs over real sockets, where every metre costs time: as fast as tests that have to
+    /// catch it between two nodes allow.
     pub fn hurry(&mut self) {
         const TIMES: f64 = 3.2;
         self.config.speed *= TIMES;

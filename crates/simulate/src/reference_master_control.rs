@@ -45,7 +45,7 @@ impl ReferenceMasterControl {
         Self::with_vehicles(USUAL_FLEET, pack)
     }
 
-    /// The same with so many mock AGVs.
+    /// A reference master control for a protocol version, with `count` mock AGVs.
     #[must_use]
     pub fn with_vehicles(count: usize, pack: &Pack) -> Self {
         let like = ReferenceAgv::new(pack);
@@ -115,7 +115,7 @@ impl ReferenceMasterControl {
         vehicle.map(ReferenceAgv::device_bindings).unwrap_or_default()
     }
 
-    /// The same with vehicles in a hurry, for runs over real sockets.
+    /// Makes the vehicles hurry, for runs over real sockets.
     pub fn hurry(&mut self) {
         for vehicle in &mut self.fleet.vehicles {
             vehicle.hurry();

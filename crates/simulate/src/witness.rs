@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use tokio::sync::mpsc;
 
+use tck_base::device::Publication;
 use tck_journal::event::{Direction, Event, Payload, Source};
-use tck_net::bench::Outgoing;
 use tck_net::bench::client::{Client, ClientEvent, ClientOptions};
 use tck_net::bench::endpoint::Endpoint;
 use tck_net::link::mqtt::Reporter;
@@ -17,13 +17,13 @@ const WILL_LIMIT: Duration = Duration::from_secs(5);
 pub(super) struct Witness {
     client: Client,
     events: mpsc::Receiver<ClientEvent>,
-    will: Outgoing,
+    will: Publication,
     reporter: Reporter,
 }
 
 impl Witness {
     /// Listens for the will of the client of that id. It is the broker that sends it, so it counts as sent when it comes.
-    pub(super) async fn open(endpoint: &Endpoint, client_id: &str, will: Outgoing, reporter: Reporter) -> Self {
+    pub(super) async fn open(endpoint: &Endpoint, client_id: &str, will: Publication, reporter: Reporter) -> Self {
         let (client, mut events) = Client::open(&ClientOptions {
             endpoint: endpoint.clone(),
             client_id: format!("{client_id}-will"),
@@ -62,7 +62,7 @@ impl Witness {
 }
 
 /// Reports what a device of the harness has sent.
-pub(super) async fn report(reporter: &Reporter, message: &Outgoing) {
+pub(super) async fn report(reporter: &Reporter, message: &Publication) {
     let event = Event::Sent {
         topic: message.topic.clone(),
         qos: message.qos,

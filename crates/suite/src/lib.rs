@@ -116,7 +116,7 @@ impl Suites {
         .map(|suites| suites.tests)
     }
 
-    /// The same with more tests.
+    /// These suites with more tests.
     ///
     /// # Errors
     /// The ids that are there already.

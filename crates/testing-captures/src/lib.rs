@@ -139,7 +139,7 @@ pub fn pcap(link: Link, frames: &[(u64, Vec<u8>)], snap: usize) -> Vec<u8> {
     file
 }
 
-/// The same as pcapng, with nanoseconds.
+/// A recording of these frames as pcapng, with nanoseconds.
 pub fn pcapng(link: Link, frames: &[(u64, Vec<u8>)]) -> Vec<u8> {
     let kind: u16 = match link {
         Link::Ethernet | Link::Vlan => 1,

@@ -100,7 +100,7 @@ enum Command {
     Actions(Vec<String>),
 }
 
-/// See the module.
+/// What is worth knowing of a vehicle at present.
 #[derive(Clone, Debug)]
 pub struct Glance {
     /// Manufacturer.

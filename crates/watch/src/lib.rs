@@ -81,7 +81,7 @@ impl Recent {
     }
 }
 
-/// See the module.
+/// Judges live traffic by the monitors, as recorded traffic is judged.
 pub struct Watch<'r> {
     audit: Audit<'r>,
     recent: Recent,

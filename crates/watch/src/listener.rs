@@ -12,7 +12,7 @@ use tck_net::bench::endpoint::Endpoint;
 const PAUSE: (Duration, Duration) = (Duration::from_millis(500), Duration::from_secs(30));
 const KEEP_ALIVE: Duration = Duration::from_secs(30);
 
-/// See the module.
+/// A subscriber that comes back whenever its connection is lost.
 pub(super) struct Listener {
     options: ClientOptions,
     open: Option<(Client, mpsc::Receiver<ClientEvent>)>,

@@ -20,7 +20,7 @@ pub struct Rotation {
     pub keep: Option<usize>,
 }
 
-/// See the module.
+/// A journal of what was heard, in parts that each can be judged by themselves.
 pub(super) struct Recorder {
     path: PathBuf,
     rotation: Rotation,

@@ -14,7 +14,7 @@ const ORDERS: usize = 4096;
 const LINKS: usize = 64;
 const FILTERS: usize = 8192;
 
-/// See the module. Shown every entry before the checks of any vehicle are.
+/// What came to all vehicles of a fleet. Shown every entry before the checks of any vehicle are.
 #[derive(Debug, Default)]
 pub struct FleetSeen {
     /// Packets are seen, so that these count and not what is delivered.

@@ -17,7 +17,7 @@ pub struct Setting<'a> {
     pub role: Role,
     /// Manufacturer and serial number of the device, or of the vehicle a master control commands.
     pub identity: (&'a str, &'a str),
-    /// The run's bindings: `time`, `device`, ….
+    /// The run's bindings, such as `time` and `device`.
     pub bindings: &'a Map<String, Value>,
     /// How long something may take.
     pub time: &'a TimeLimits,

@@ -94,7 +94,7 @@ pub struct Run {
     /// Make identifiers, the order of events and what is drawn from schemas and matrices repeatable
     #[arg(long, value_name = "NUMBER")]
     pub seed: Option<u64>,
-    /// The same for everybody: set by `certify`.
+    /// Whether it is a run for a certificate, which is alike for everybody: set by `certify`.
     #[arg(skip)]
     pub certificate: bool,
     /// Only part I of N of the tests, for several benches at once

@@ -47,7 +47,7 @@ pub struct SimulatedSite {
     /// How many of the messages are faulty
     #[arg(long, value_name = "NUMBER", default_value_t = 0)]
     pub faults: u64,
-    /// The same recording for the same seed
+    /// Make the same recording for the same seed
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     pub seed: u64,
     /// Where it is written what is wrong where, one fault a line

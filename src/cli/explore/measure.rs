@@ -1,8 +1,7 @@
 //! How many faults of a built-in device an exploration finds by itself, beyond what it says of the device without a fault.
 
 use std::fmt::Write as _;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use serde_json::json;
 
@@ -12,6 +11,7 @@ use crate::cli::problem::Problem;
 use tck_explore::{Chain, ConversationFile, Coverage, Exploration, Finding, findings};
 use tck_judge::Library;
 use tck_pack::{Pack, Role};
+use tck_qualify::on_all_cores;
 use tck_reference::Fault;
 use tck_run::{Selection, VirtualRun, run_silently};
 use tck_simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl};
@@ -29,7 +29,7 @@ struct Measured {
     named: bool,
 }
 
-/// So many conversations are carried out before it is looked whether the fault is found.
+/// How many conversations are carried out before it is looked whether the fault is found.
 const AT_ONCE: usize = 17;
 
 /// Explores the built-in device with every fault, or every so manyth, and says which of them are found.
@@ -58,22 +58,7 @@ pub(super) fn every_fault(
     let faults = BuiltIn::faults(device.role()).iter().filter(meant);
     let faults: Vec<&'static Fault> = faults.step_by(every).collect();
     let good = told(&device, &library, pack, &rounds, None, |_| false)?;
-    let next = AtomicUsize::new(0);
-    let all: Mutex<Vec<Result<Measured, Problem>>> = Mutex::new(Vec::new());
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    std::thread::scope(|scope| {
-        for _ in 0..threads {
-            scope.spawn(|| {
-                while let Some(fault) = faults.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let found = one(&device, &library, pack, &rounds, fault, &good);
-                    all.lock()
-                        .unwrap_or_else(std::sync::PoisonError::into_inner)
-                        .push(found);
-                }
-            });
-        }
-    });
-    let all = all.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let all = on_all_cores(&faults, |&fault| one(&device, &library, pack, &rounds, fault, &good));
     let mut all: Vec<Measured> = all.into_iter().collect::<Result<_, _>>()?;
     all.sort_by_key(|one| one.fault.name);
     let stimuli: usize = drawn.iter().map(|(chain, _)| chain.stimuli().len()).sum();

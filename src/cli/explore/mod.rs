@@ -81,8 +81,8 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
     })
 }
 
-/// The same grammar with nothing but the stimuli that are named, and those that lead to them and from one to the next, which
-/// are drawn less often.
+/// Keeps of a grammar the stimuli that are named, and those that lead to them and from one to the next, which are drawn
+/// less often.
 fn focused(mut grammar: Grammar, focus: &[String]) -> Result<Grammar, Problem> {
     if focus.is_empty() {
         return Ok(grammar);

@@ -119,7 +119,7 @@ impl OnStage {
         })
     }
 
-    /// The same, with a time after which no conversation that was drawn begins. Stimuli are tried one by one for half of
+    /// Sets the time after which no conversation that was drawn begins. Stimuli are tried one by one for half of
     /// this time at most.
     pub(super) fn within(self, budget: Option<Duration>) -> Self {
         Self {

@@ -15,7 +15,8 @@ use tck_watch::session::{Contact, Happening, Viewer};
 use tck_watch::{Notice, Watch};
 use view::{Focus, View};
 
-/// See the module.
+/// A watch on the whole screen: vehicles, what was found of the chosen one, and the message with the wrong member
+/// marked.
 pub struct FullScreen {
     terminal: DefaultTerminal,
     view: View,

@@ -19,7 +19,7 @@ pub(super) enum Focus {
     Findings,
 }
 
-/// See the module.
+/// What is where on the screen.
 pub(super) struct View {
     broker: String,
     pub note: String,

@@ -20,7 +20,8 @@ use tck_journal::Parsed;
 use tck_pack::Packs;
 use tck_view::{Header, Names};
 
-/// See the module.
+/// Messages and findings as tables, for people who go on in their notebooks: a Parquet file for each topic name, and
+/// one of findings.
 pub struct Export<'p> {
     packs: &'p Packs,
     folder: PathBuf,

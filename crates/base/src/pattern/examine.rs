@@ -15,7 +15,7 @@ const MISS_LIMIT: usize = 20;
 /// A message compared with a pattern.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Examination {
-    /// The same answer as [`Bound::matches`].
+    /// Whether it matches, as [`Bound::matches`] says.
     pub matched: bool,
     /// Leaves of the pattern that agree, and all leaves. Of two messages the one with more agreeing leaves is nearer.
     pub score: (usize, usize),
@@ -246,7 +246,7 @@ impl Bound {
         }
     }
 
-    /// The same among those that were not there before.
+    /// The nearest element among those that were not there before.
     fn nearest_new(
         &self,
         inner: &Self,

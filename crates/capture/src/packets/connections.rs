@@ -74,7 +74,7 @@ impl Direction {
     }
 }
 
-/// See the module.
+/// TCP connections with MQTT on them, as somebody between client and broker sees them.
 #[derive(Default)]
 pub(super) struct Connections {
     open: HashMap<(End, End), Connection>,

@@ -31,7 +31,8 @@ struct Early {
     missing: u32,
 }
 
-/// See the module.
+/// One direction of a TCP connection, put in order: what came twice is left out, what came early waits, and what never
+/// came is a gap.
 #[derive(Default)]
 pub(super) struct Flow {
     /// Sequence number of the next byte, once it is known.

@@ -76,7 +76,7 @@ struct Interface {
     offset: i64,
 }
 
-/// See the module.
+/// The frames of a pcap or pcapng file, and the TCP segment in each.
 pub(super) struct Frames {
     reader: Box<dyn PcapReaderIterator>,
     interfaces: Vec<Interface>,

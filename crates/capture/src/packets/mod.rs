@@ -22,7 +22,7 @@ use tck_journal::event::Packet;
 
 pub(super) use frames::begins;
 
-/// See the module.
+/// Captured network traffic: pcap and pcapng files with MQTT over TCP.
 pub struct Packets {
     frames: Frames,
     file: usize,

@@ -23,7 +23,8 @@ enum State {
     Foreign,
 }
 
-/// See the module.
+/// One direction of an MQTT connection: packets out of bytes, from the beginning or from the first message that can be
+/// told for certain.
 #[derive(Default)]
 pub(super) struct Talk {
     state: State,

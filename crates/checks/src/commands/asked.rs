@@ -8,7 +8,7 @@ use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_view::ActionView;
 use tck_world::{Listen, Observation, Topic};
 
-/// See the module.
+/// Kinds of instant actions that must not come, whatever the array they come in is called.
 pub(crate) const NOT_ASKED: Check = Check {
     name: "commands/not-asked",
     decides: &[

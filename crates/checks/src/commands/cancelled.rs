@@ -11,7 +11,7 @@ use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_view::{Node, OrderView, StateView};
 use tck_world::{Fact, Listen, Observation, Outside, ShownState};
 
-/// See the module.
+/// A base is given up only by cancelOrder.
 pub(crate) const BASE_KEPT: Check = Check {
     name: "commands/base-kept",
     decides: &["ORD-CANCEL-01"],

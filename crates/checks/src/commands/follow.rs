@@ -182,7 +182,7 @@ struct Order {
     last_used: Moment,
     /// Whether a state has shown that nothing is left of it.
     done: bool,
-    /// The same, and nobody has done anything to the vehicle meanwhile.
+    /// Whether a state has shown that nothing is left of it, and nobody has done anything to the vehicle meanwhile.
     ended: bool,
 }
 

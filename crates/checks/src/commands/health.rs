@@ -15,7 +15,7 @@ use tck_pack::HookEffect;
 use tck_view::{ConnectionView, OrderView, StateView};
 use tck_world::{Listen, Observation, Topic};
 
-/// See the module.
+/// What the connection topic must not be taken for.
 pub(crate) const HEALTH: Check = Check {
     name: "commands/health",
     decides: &["CONN-14"],

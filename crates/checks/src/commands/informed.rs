@@ -13,7 +13,7 @@ use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_view::{ActionView, StateView};
 use tck_world::{Listen, Observation, Topic};
 
-/// See the module.
+/// Instant actions that a vehicle provokes by its information entries.
 pub(crate) const ON_INFORMATION: Check = Check {
     name: "commands/on-information",
     decides: &["INFO-02"],
@@ -28,7 +28,7 @@ pub(crate) const ON_INFORMATION: Check = Check {
 
 /// So soon comes what an information has brought about.
 const AT_ONCE: Duration = Duration::from_secs(1);
-/// So often it has to come before it is no chance.
+/// How often it has to come before it is no chance.
 const TIMES: u32 = 3;
 /// How many types are remembered.
 const KINDS: usize = 64;

@@ -51,7 +51,7 @@ pub(crate) const NEXT_CORRIDOR: Check = Check {
 
 /// How far a position may be wrong, in metres.
 const SLACK: f64 = 0.1;
-/// The same on a node, where the vehicle is slow.
+/// How far a position on a node may be wrong, where the vehicle is slow, in metres.
 const SLACK_ON_NODE: f64 = 0.05;
 /// Nearer to its trajectory the vehicle has not left it, in metres.
 const LEFT: f64 = 0.15;

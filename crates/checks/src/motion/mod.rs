@@ -46,7 +46,7 @@ fn found(seq: u64, message: String) -> CheckFinding {
     }
 }
 
-/// The same, softened to a warning by a ruling.
+/// A finding that a ruling softens to a warning.
 fn softly(seq: u64, message: String) -> CheckFinding {
     CheckFinding {
         verdict: Some(Verdict::Warning),

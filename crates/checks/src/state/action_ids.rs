@@ -16,7 +16,7 @@ const LONGEST: u64 = 1024;
 /// A shorter beginning may be a name of its own.
 const BEGINNING: usize = 8;
 
-/// See the module.
+/// The vehicle names its actions as they were sent.
 pub(crate) const ACTION_IDS: Check = Check {
     name: "state/action-ids",
     decides: &["STATE-MSG-14"],

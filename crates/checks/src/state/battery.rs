@@ -9,7 +9,7 @@ use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_view::{BatteryState, StateView};
 use tck_world::{End, Listen, Observation, Topic};
 
-/// See the module.
+/// A vehicle that only knows good and bad says so with 80 and 20 percent.
 pub(crate) const LEVELS: Check = Check {
     name: "state/battery-levels",
     decides: &["STATE-MSG-16"],

@@ -9,7 +9,7 @@ use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_view::Print;
 use tck_world::{Listen, Observation, Topic};
 
-/// See the module.
+/// States that say the same, one right after the other.
 pub(crate) const BURSTS: Check = Check {
     name: "state/bursts",
     decides: &["STATE-11"],
@@ -31,9 +31,9 @@ pub(crate) const BURSTS: Check = Check {
     start: |_| Box::new(Bursts::default()),
 };
 
-/// This many equal states are a burst …
+/// How many equal states are a burst, if they come within [`WITHIN`].
 const BURST: usize = 5;
-/// … if they come within this time.
+/// The time within which the states of a burst come.
 const WITHIN: Duration = Duration::from_millis(250);
 
 #[derive(Default)]

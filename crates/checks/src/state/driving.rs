@@ -25,7 +25,7 @@ const CLOSE: Duration = Duration::from_secs(2);
 const ONE_CYCLE: Duration = Duration::from_millis(200);
 /// Faster than this no vehicle drives, in metres per second: it has found out that it is elsewhere.
 const JUMP: f64 = 20.0;
-/// So long a vehicle may say that it drives while it stands and has nowhere to go.
+/// How long a vehicle may say that it drives while it stands and has nowhere to go.
 const COMING_TO_REST: Duration = Duration::from_secs(10);
 /// Nodes that lie less far apart say nothing of a position, in metres.
 const APART: f64 = 1.0;

@@ -12,7 +12,7 @@ use tck_world::{Fact, Listen, Observation, Topic};
 /// How many loads, places and actions are looked at.
 const MANY: usize = 256;
 
-/// See the module.
+/// A vehicle that knows its load says so in every state, and names the places of its factsheet.
 pub(crate) const LOADS: Check = Check {
     name: "state/loads",
     decides: &["STATE-MSG-06", "FACT-09"],

@@ -14,7 +14,7 @@ use tck_world::{Fact, Listen, Observation, Topic, sets_position};
 /// How many maps and map actions are kept in mind.
 const LIMIT: usize = 1024;
 
-/// See the module.
+/// Every change of `maps` from one state to the next has the cause that the protocol knows for it.
 pub(crate) const MAP_CHANGES: Check = Check {
     name: "state/map-changes",
     decides: &["MAP-06", "MAP-20", "MAP-22", "MAP-24", "MAP-32"],

@@ -12,7 +12,7 @@ use tck_world::{Fact, Listen, Observation, Topic};
 /// How many orders on their way are kept in mind.
 const ORDERS: usize = 64;
 
-/// See the module.
+/// `orderId` and `orderUpdateId` stay until a new order is accepted.
 pub(crate) const ORDER_KEPT: Check = Check {
     name: "state/order-kept",
     decides: &["STATE-MSG-02", "ORD-CANCEL-08"],

@@ -8,10 +8,10 @@ use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_view::StateView;
 use tck_world::{Fact, Listen, Observation, Topic};
 
-/// So long a vehicle may take to come to rest.
+/// How long a vehicle may take to come to rest.
 const COMING_TO_REST: Duration = Duration::from_secs(10);
 
-/// See the module.
+/// A vehicle that is paused comes to rest and stays there.
 pub(crate) const PAUSE_STANDS: Check = Check {
     name: "state/pause-stands",
     decides: &["ACT-12"],

@@ -11,10 +11,10 @@ use tck_world::{Listen, Observation, Topic};
 
 /// How many actions are looked at.
 const ACTIONS: usize = 256;
-/// So long what was held may take to go on.
+/// How long what was held may take to go on.
 const GOING_ON: Duration = Duration::from_secs(2);
 
-/// See the module.
+/// An action is PAUSED only while something holds the vehicle.
 pub(crate) const PAUSED: Check = Check {
     name: "state/paused-actions",
     decides: &["ASTATE-04"],

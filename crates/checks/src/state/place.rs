@@ -9,7 +9,7 @@ use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_view::{Deviation, NodePosition, OrderView, Position, StateView};
 use tck_world::{Listen, Observation, Topic, sets_position};
 
-/// See the module.
+/// A vehicle that was stopped does not name a node it has not come to as its last one.
 pub(crate) const LAST_NODE_PLACE: Check = Check {
     name: "state/last-node-place",
     decides: &["STATE-MSG-04"],

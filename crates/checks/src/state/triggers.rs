@@ -12,7 +12,7 @@ use tck_world::{Fact, Listen, Observation, Placed, Topic};
 /// How many actions are kept in mind from one state to the next.
 const ACTIONS: usize = 1024;
 
-/// See the module.
+/// Actions of an order begin where they belong, and edge actions end there.
 pub(crate) const TRIGGERS: Check = Check {
     name: "state/action-triggers",
     decides: &["ASTATE-02", "ASTATE-03", "ACT-02", "NODE-05"],

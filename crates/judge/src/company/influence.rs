@@ -10,13 +10,13 @@ use tck_journal::event::{LinkFault, Payload};
 
 /// For how long what the harness did to the link excuses a device that comes back in another shape.
 const AFTER_FAULT: Duration = Duration::from_secs(60);
-/// The same of a hook.
+/// For how long what a hook did excuses a device that comes back in another shape.
 const AFTER_HOOK: Duration = Duration::from_secs(150);
 /// For how long a message that somebody else has sent in the name of the device may show in what is found.
 pub(super) const AFTER_FORGERY: Duration = Duration::from_secs(5);
-/// The same of somebody who took the client id of the device, and threw it out.
+/// For how long the doing of somebody who took the client id of the device, and threw it out, may show in what is found.
 pub(super) const AFTER_TAKEOVER: Duration = Duration::from_secs(60);
-/// The same of somebody who commanded the device.
+/// For how long the doing of somebody who commanded the device may show in what is found.
 pub(super) const AFTER_COMMAND: Duration = Duration::from_secs(120);
 /// How many messages of strangers are awaited from the broker.
 const AWAITED: usize = 20_000;

@@ -25,7 +25,8 @@ struct Double {
     is_duel: bool,
 }
 
-/// See the module.
+/// Others that may have been taken for the device, where no look tells them apart: they are named, and no run passes in
+/// which they are more than a connection that was opened anew.
 #[derive(Debug, Default)]
 pub(super) struct Rivals {
     doubles: BTreeMap<String, Double>,

@@ -16,9 +16,9 @@ use tck_journal::Entry;
 use tck_journal::event::Event;
 use tck_suite::model::{Assertion, Expect};
 
-/// So many earlier messages are asked whether an element was there before.
+/// How many earlier messages are asked whether an element was there before.
 const LOOK_BACK: usize = 200;
-/// So many are asked about one of the asserted type: what comes and goes of its own shows up in them, and a refusal
+/// How many earlier messages are asked whether an element of the asserted type was there: what comes and goes of its own shows up in them, and a refusal
 /// of an earlier test, in the same words, does not.
 const LOOK_BACK_FOR_TYPE: usize = 12;
 

@@ -15,7 +15,7 @@ use tokio::task::JoinHandle;
 
 use super::dial::{Bridge, dial, unreachable};
 use super::endpoint::Endpoint;
-use crate::bench::Outgoing;
+use tck_base::device::Publication;
 
 /// Largest packet taken and sent; rumqttc's own limit of 10 KiB is less than an order can have.
 const LARGEST_PACKET: usize = 256 << 20;
@@ -39,7 +39,7 @@ pub struct ClientOptions {
     /// Clean session.
     pub clean_session: bool,
     /// The last will.
-    pub will: Option<Outgoing>,
+    pub will: Option<Publication>,
     /// Topic filters and QoS.
     pub subscriptions: Vec<(String, u8)>,
 }
@@ -105,7 +105,7 @@ impl Client {
     }
 
     /// Puts a message on its way. `false` when there is no connection any more or too much is waiting already.
-    pub fn publish(&self, message: Outgoing) -> bool {
+    pub fn publish(&self, message: Publication) -> bool {
         let qos = quality(message.qos);
         !self.running.is_finished()
             && self

@@ -5,9 +5,6 @@ use std::time::Duration;
 
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::{TcpListener, TcpStream};
-use tokio_rustls::TlsConnector;
-use tokio_rustls::rustls::pki_types::ServerName;
-use tokio_rustls::rustls::{CertificateError, Error as TlsError};
 
 use super::endpoint::Endpoint;
 use super::stream::Stream;
@@ -34,10 +31,8 @@ async fn open(endpoint: &Endpoint) -> Result<Box<dyn Stream>, String> {
     let stream: Box<dyn Stream> = match &endpoint.tls {
         None => Box::new(socket),
         Some(tls) => {
-            let name = ServerName::try_from(endpoint.host.clone());
-            let name = name.map_err(|_| format!("no certificate can be for the name `{}`", endpoint.host))?;
-            let secured = TlsConnector::from(tls.clone()).connect(name, socket).await;
-            Box::new(secured.map_err(|error| handshake_failed(&error, endpoint))?)
+            let plain = if endpoint.websocket.is_some() { "ws" } else { "mqtt" };
+            tls.secure(socket, &endpoint.host, plain).await?
         }
     };
     match &endpoint.websocket {
@@ -49,37 +44,6 @@ async fn open(endpoint: &Endpoint) -> Result<Box<dyn Stream>, String> {
 /// Nobody is there.
 pub(crate) fn unreachable(error: &io::Error) -> String {
     format!("it is not reachable: {error}")
-}
-
-fn handshake_failed(error: &io::Error, endpoint: &Endpoint) -> String {
-    let plain = if endpoint.websocket.is_some() { "ws" } else { "mqtt" };
-    let cause = error.get_ref().and_then(|cause| cause.downcast_ref::<TlsError>());
-    match cause {
-        Some(TlsError::InvalidCertificate(wrong)) => certificate_refused(wrong, endpoint),
-        Some(TlsError::InvalidMessage(_)) => format!("it does not speak TLS there; without TLS it is {plain}://"),
-        Some(TlsError::AlertReceived(alert)) => {
-            format!("it refuses the TLS connection ({alert:?}); it may ask for a certificate of the client")
-        }
-        _ => format!("it ends the connection during the TLS handshake ({error}); without TLS it is {plain}://"),
-    }
-}
-
-fn certificate_refused(wrong: &CertificateError, endpoint: &Endpoint) -> String {
-    match wrong {
-        CertificateError::UnknownIssuer => {
-            "its certificate is not trusted, because the authority that signed it is not \
-                                            known (UnknownIssuer); `tls-ca` names a PEM file with that authority"
-                .to_owned()
-        }
-        CertificateError::NotValidForName | CertificateError::NotValidForNameContext { .. } => format!(
-            "its certificate is for another name than `{}` ({wrong}); the URL has to name the broker as its certificate does",
-            endpoint.host
-        ),
-        CertificateError::Expired | CertificateError::ExpiredContext { .. } => {
-            format!("its certificate has expired ({wrong})")
-        }
-        other => format!("its certificate is not accepted ({other})"),
-    }
 }
 
 /// A port of this machine through which a client that knows TCP only reaches a broker behind TLS or WebSocket.

@@ -1,12 +1,10 @@
 //! Where a broker is and how to get in.
 
 use std::path::PathBuf;
-use std::sync::Arc;
-
-use tokio_rustls::rustls::ClientConfig;
 
 use crate::bench::LinkError;
-use crate::bench::tls::{self, TlsFiles};
+use crate::bench::secure::TlsClient;
+use crate::bench::tls::TlsFiles;
 use tck_profile::Secrets;
 
 /// The path of a WebSocket unless said, as most brokers have it.
@@ -51,7 +49,7 @@ pub struct Endpoint {
     /// Port.
     pub port: u16,
     /// Set for TLS.
-    pub tls: Option<Arc<ClientConfig>>,
+    pub tls: Option<TlsClient>,
     /// Set for WebSocket: the path, with the query behind it, which may hold a token.
     pub websocket: Option<String>,
     /// PEM file with the authority that is trusted there, and where files are fetched from.
@@ -129,7 +127,7 @@ impl Endpoint {
             host: host.to_owned(),
             port,
             tls: if secure {
-                Some(tls::client(access.authority.as_deref(), access.identity.as_ref())?)
+                Some(TlsClient::new(access.authority.as_deref(), access.identity.as_ref())?)
             } else {
                 None
             },

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use tokio::sync::Notify;
 
-/// So many messages are remembered that no vehicle has taken yet.
+/// How many messages are remembered that no vehicle has taken yet.
 const REMEMBERED: usize = 4_096;
 /// A vehicle does not wait longer than this: the message may never come to the harness.
 const PATIENCE: Duration = Duration::from_millis(250);

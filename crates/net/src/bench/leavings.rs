@@ -5,15 +5,16 @@ use std::time::Duration;
 use bytes::Bytes;
 use tokio::time::{Instant, timeout_at};
 
+use super::LinkError;
 use super::client::{Client, ClientEvent, ClientOptions};
 use super::endpoint::Endpoint;
-use super::{LinkError, Outgoing};
+use tck_base::device::Publication;
 
 /// How long the broker may take to let the harness in.
 const ANSWER_LIMIT: Duration = Duration::from_secs(10);
 /// After so long without a stored message there is none left.
 const PATIENCE: Duration = Duration::from_millis(500);
-/// So long it looks at most.
+/// How long it looks at most.
 const LIMIT: Duration = Duration::from_secs(10);
 
 /// Clears the retained messages on topics that match `filters` and are the harness's own, and names these topics.
@@ -55,7 +56,7 @@ pub async fn clear(
                 if payload.is_empty() || !is_own(&topic) {
                     continue;
                 }
-                let nothing = Outgoing {
+                let nothing = Publication {
                     topic: topic.clone(),
                     payload: Bytes::new(),
                     qos: 1,

@@ -1,4 +1,4 @@
-//! What link, broker, tap and map server share: messages and files on their way, the inbox of everything that happens,
+//! What link, broker, tap and map server share: files on their way, the inbox of everything that happens,
 //! connections to a broker, certificates and ports.
 
 pub mod client;
@@ -10,25 +10,13 @@ pub mod kin;
 pub mod leavings;
 pub mod listen;
 pub mod own;
+pub mod secure;
 pub mod stream;
 pub mod tls;
 pub mod web;
 mod websocket;
 
 use tck_journal::ServeBehaviour;
-
-/// A message the harness publishes.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Outgoing {
-    /// Full topic.
-    pub topic: String,
-    /// Payload.
-    pub payload: bytes::Bytes,
-    /// QoS.
-    pub qos: u8,
-    /// RETAIN.
-    pub retain: bool,
-}
 
 /// A file for the map server.
 #[derive(Clone, Debug, PartialEq, Eq)]

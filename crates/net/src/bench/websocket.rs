@@ -14,7 +14,7 @@ use super::stream::Stream;
 
 /// Largest message taken; a broker may put several packets into one.
 const LARGEST_MESSAGE: usize = 256 << 20;
-/// So many bytes are on their way between the two sides.
+/// How many bytes are on their way between the two sides.
 const ROOM: usize = 64 << 10;
 
 /// Asks the broker for a WebSocket with MQTT in it.

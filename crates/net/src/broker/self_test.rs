@@ -7,10 +7,11 @@ use bytes::Bytes;
 use tokio::sync::mpsc;
 use tokio::time::timeout;
 
+use crate::bench::LinkError;
 use crate::bench::client::{Client, ClientEvent, ClientOptions, REFUSED_SUBSCRIPTION};
 use crate::bench::endpoint::Endpoint;
 use crate::bench::own::OwnNames;
-use crate::bench::{LinkError, Outgoing};
+use tck_base::device::Publication;
 
 /// How long each message may take.
 const LIMIT: Duration = Duration::from_secs(5);
@@ -143,7 +144,7 @@ impl<'a> Tester<'a> {
     async fn connect(
         (endpoint, own): (&'a Endpoint, &OwnNames),
         name: &str,
-        will: Option<Outgoing>,
+        will: Option<Publication>,
         subscriptions: Vec<(String, u8)>,
     ) -> Result<Self, LinkError> {
         let client_id = own.client(name);
@@ -178,7 +179,7 @@ impl<'a> Tester<'a> {
         }
     }
 
-    fn publish(&self, message: Outgoing) -> Result<(), LinkError> {
+    fn publish(&self, message: Publication) -> Result<(), LinkError> {
         if self.client.publish(message) {
             Ok(())
         } else {
@@ -215,8 +216,8 @@ impl<'a> Tester<'a> {
     }
 }
 
-fn message(topic: &str, text: &str, qos: u8, retain: bool) -> Outgoing {
-    Outgoing {
+fn message(topic: &str, text: &str, qos: u8, retain: bool) -> Publication {
+    Publication {
         topic: topic.to_owned(),
         payload: Bytes::copy_from_slice(text.as_bytes()),
         qos,

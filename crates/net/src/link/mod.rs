@@ -8,8 +8,9 @@ mod filter;
 pub mod memory;
 pub mod mqtt;
 
-use crate::bench::{LinkError, Offer, Outgoing};
+use crate::bench::{LinkError, Offer};
 use tck_base::clock::{Moment, Stamp};
+use tck_base::device::Publication;
 use tck_journal::Vantage;
 use tck_journal::event::{LinkFault, Occurrence};
 
@@ -23,7 +24,7 @@ pub trait Link {
     fn vantage(&self) -> Vantage;
 
     /// Publishes a message. Returns when it is on its way; the engine journals it before calling.
-    async fn publish(&mut self, message: Outgoing) -> Result<(), LinkError>;
+    async fn publish(&mut self, message: Publication) -> Result<(), LinkError>;
 
     /// The next thing that happens, or `None` when `until` has come. With `until` in the past it only
     /// returns what has already happened. Cancel-safe.

@@ -4,38 +4,20 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio::sync::watch;
 
 use super::pump::{Both, Pump};
 use super::{Admitted, Control, Shared, faults};
 use crate::bench::dial::dial;
-use crate::bench::stream::Stream;
+use crate::bench::stream::{Socket, Stream};
 use tck_journal::event::{Close, Direction, Event, Source};
 
 /// How long the TLS handshake may take.
 const SETUP_LIMIT: Duration = Duration::from_secs(10);
 /// How long a side that was told the end may take to close its own.
 const DRAIN_LIMIT: Duration = Duration::from_secs(1);
-
-/// A byte stream over TCP, with or without TLS.
-pub(super) trait Socket: AsyncRead + AsyncWrite + Unpin + Send {
-    /// The TCP connection below.
-    fn tcp(&self) -> &TcpStream;
-}
-
-impl Socket for TcpStream {
-    fn tcp(&self) -> &TcpStream {
-        self
-    }
-}
-
-impl Socket for tokio_rustls::server::TlsStream<TcpStream> {
-    fn tcp(&self) -> &TcpStream {
-        self.get_ref().0
-    }
-}
 
 /// How a connection came to its end.
 enum End {
@@ -182,11 +164,11 @@ enum SetUpError {
 }
 
 async fn device_side(socket: TcpStream, shared: &Shared) -> Result<Box<dyn Socket>, SetUpError> {
-    let Some(acceptor) = &shared.tls else {
+    let Some(tls) = &shared.tls else {
         return Ok(Box::new(socket));
     };
-    match tokio::time::timeout(SETUP_LIMIT, acceptor.accept(socket)).await {
-        Ok(Ok(stream)) => Ok(Box::new(stream)),
+    match tokio::time::timeout(SETUP_LIMIT, tls.accept(socket)).await {
+        Ok(Ok(stream)) => Ok(stream),
         Ok(Err(error)) => Err(SetUpError::Device(format!(
             "the TLS handshake with the device failed: {error}"
         ))),

@@ -14,14 +14,13 @@ use std::time::Duration;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::watch;
 use tokio::task::{JoinHandle, JoinSet};
-use tokio_rustls::TlsAcceptor;
-use tokio_rustls::rustls::ServerConfig;
 
 use crate::bench::LinkError;
 use crate::bench::endpoint::Endpoint;
 use crate::bench::inbox::Reporter;
 use crate::bench::kin::Kin;
 use crate::bench::listen::{cannot_listen, listen_on};
+use crate::bench::secure::TlsServer;
 use faults::{Change, Faults};
 use tck_journal::event::{Direction, Event, LinkFault, Source};
 
@@ -49,7 +48,7 @@ struct Control {
 struct Shared {
     reporter: Reporter,
     upstream: Upstream,
-    tls: Option<TlsAcceptor>,
+    tls: Option<TlsServer>,
     /// What belongs to the program that the run has started.
     kin: Kin,
     faults: Mutex<Faults>,
@@ -72,7 +71,7 @@ impl Tap {
     /// [`LinkError::Listen`] when the port is taken or may not be opened.
     pub async fn start(
         listen: &str,
-        tls: Option<Arc<ServerConfig>>,
+        tls: Option<TlsServer>,
         upstream: Upstream,
         reporter: Reporter,
     ) -> Result<Self, LinkError> {
@@ -81,7 +80,7 @@ impl Tap {
         let shared = Arc::new(Shared {
             reporter,
             upstream,
-            tls: tls.map(TlsAcceptor::from),
+            tls,
             kin: Kin::default(),
             faults: Mutex::default(),
             control: watch::Sender::default(),

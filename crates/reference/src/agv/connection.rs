@@ -107,7 +107,7 @@ impl Agv {
             message.insert("connectionState".into(), json!("CONNECTIONBROKEN"));
             Publication {
                 topic,
-                payload: Value::Object(message).to_string().into_bytes(),
+                payload: Value::Object(message).to_string().into(),
                 qos: 1,
                 retain: true,
             }
@@ -216,7 +216,7 @@ impl Agv {
         self.writes(&outgoing, &mut payload);
         self.pending.push(Output::Publish(Publication {
             topic: outgoing.topic,
-            payload,
+            payload: payload.into(),
             qos: outgoing.qos,
             retain: outgoing.retain,
         }));

@@ -53,15 +53,17 @@ impl Agv {
             .into_iter()
             .any(|other| other.text("mapId") == map_id && other.text("mapVersion") == version);
         let known = self.maps.has_version(map_id, version) && !self.allows(Permission::DownloadAgain, false);
-        let refusal = match () {
-            () if known => Some("the map is on board already"),
-            () if self.maps.is_full() => Some("there is no room for another map"),
-            () if twice => Some("the map is being downloaded already"),
-            () if map_id.is_empty() || version.is_empty() => Some("mapId or mapVersion is empty"),
-            () if !(url.starts_with("http://") || url.starts_with("https://")) => Some("the link is not HTTP"),
-            () => None,
-        };
-        if let Some(reason) = refusal {
+        let hindrances = [
+            (known, "the map is on board already"),
+            (self.maps.is_full(), "there is no room for another map"),
+            (twice, "the map is being downloaded already"),
+            (map_id.is_empty() || version.is_empty(), "mapId or mapVersion is empty"),
+            (
+                !(url.starts_with("http://") || url.starts_with("https://")),
+                "the link is not HTTP",
+            ),
+        ];
+        if let Some((_, reason)) = hindrances.iter().find(|(hinders, _)| *hinders) {
             return Outcome::Failed(Problem::map(&action, reason));
         }
         let token = self.downloads.next;

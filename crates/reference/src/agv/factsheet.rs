@@ -81,10 +81,12 @@ impl Agv {
     }
 
     fn type_specification(&self) -> Value {
-        let navigation = match () {
-            () if self.config.line_guided() => "PHYSICAL_LINE_GUIDED",
-            () if self.config.plans => "AUTONOMOUS",
-            () => "VIRTUAL_LINE_GUIDED",
+        let navigation = if self.config.line_guided() {
+            "PHYSICAL_LINE_GUIDED"
+        } else if self.config.plans {
+            "AUTONOMOUS"
+        } else {
+            "VIRTUAL_LINE_GUIDED"
         };
         json!({
             "seriesName": "Reference AGV",

@@ -51,7 +51,7 @@ enum Leg {
 /// Orientation of a vehicle while it follows a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Facing {
-    /// So much beside the direction of the path, in radians.
+    /// How much beside the direction of the path, in radians.
     Along(f64),
     /// Always there, in radians.
     Fixed(f64),

@@ -83,10 +83,12 @@ impl Site {
     pub(crate) fn fitting(&self, vehicle: &Vehicle, what: &str, full: String, count: u64) -> String {
         let number = format!("{}{count:05}", self.session);
         let longest = self.longest_id(vehicle);
-        match () {
-            () if full.len() <= longest && self.takes_letters(vehicle, what) => full,
-            () if number.len() <= longest => number,
-            () => count.to_string(),
+        if full.len() <= longest && self.takes_letters(vehicle, what) {
+            full
+        } else if number.len() <= longest {
+            number
+        } else {
+            count.to_string()
         }
     }
 

@@ -49,7 +49,7 @@ impl Site {
     pub(crate) fn push(&mut self, topic: String, payload: Vec<u8>, qos: u8, retain: bool) {
         self.pending.push(Output::Publish(Publication {
             topic,
-            payload,
+            payload: payload.into(),
             qos,
             retain,
         }));

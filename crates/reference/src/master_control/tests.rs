@@ -6,7 +6,6 @@ mod talking;
 
 use std::time::Duration;
 
-use bytes::Bytes;
 use serde_json::{Value, json};
 
 use crate::agv::{Agv, AgvConfig};
@@ -119,7 +118,7 @@ impl Bench {
                 if !self.deaf {
                     for index in 0..self.agvs.len() {
                         let topic = publication.topic.clone();
-                        let payload = Bytes::from(publication.payload.clone());
+                        let payload = publication.payload.clone();
                         self.agv_gets(index, Input::Message { topic, payload });
                     }
                 }
@@ -134,10 +133,9 @@ impl Bench {
         for output in out {
             if let Output::Publish(publication) = output {
                 self.pass(&publication.topic, &publication.payload);
-                let payload = Bytes::from(publication.payload);
                 self.master_gets(Input::Message {
                     topic: publication.topic,
-                    payload,
+                    payload: publication.payload,
                 });
             }
         }

@@ -22,7 +22,7 @@ pub struct MessageView {
     pub seq: u64,
     pub kind: String,
     pub headline: String,
-    /// Why it is shown: `fail`, `nearest miss`, `stimulus`, …
+    /// Why it is shown, such as `fail`, `nearest miss` or `stimulus`.
     pub role: String,
     /// Where it came from and went to.
     pub way: &'static str,

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, VecDeque};
 
 use bytes::Bytes;
 
-use crate::bench::Outgoing;
 use crate::link::filter::covers;
+use tck_base::device::Publication;
 
 /// A client of the broker; the harness's own standing subscription is one of them.
 pub(super) type Client = u64;
@@ -35,7 +35,7 @@ pub(super) struct Accepted {
 struct Session {
     client_id: String,
     clean: bool,
-    will: Option<Outgoing>,
+    will: Option<Publication>,
     kept: Kept,
 }
 
@@ -49,7 +49,7 @@ struct Kept {
 /// The broker.
 #[derive(Default)]
 pub(super) struct Broker {
-    retained: BTreeMap<String, Outgoing>,
+    retained: BTreeMap<String, Publication>,
     present: BTreeMap<Client, Session>,
     absent: BTreeMap<String, Kept>,
 }
@@ -57,7 +57,13 @@ pub(super) struct Broker {
 impl Broker {
     /// Accepts a client. The will of a connection that is taken over is the caller's to publish, by
     /// [`Broker::leave`] of the displaced client.
-    pub(super) fn accept(&mut self, client: Client, client_id: &str, clean: bool, will: Option<Outgoing>) -> Accepted {
+    pub(super) fn accept(
+        &mut self,
+        client: Client,
+        client_id: &str,
+        clean: bool,
+        will: Option<Publication>,
+    ) -> Accepted {
         let displaced = (self.present.iter())
             .find(|(_, session)| session.client_id == client_id)
             .map(|(client, _)| *client);
@@ -108,7 +114,7 @@ impl Broker {
     }
 
     /// Takes a message in; returns who gets it. Live deliveries never have RETAIN set.
-    pub(super) fn publish(&mut self, message: Outgoing) -> Vec<(Client, Delivery)> {
+    pub(super) fn publish(&mut self, message: Publication) -> Vec<(Client, Delivery)> {
         let mut deliveries = Vec::new();
         for (client, session) in &self.present {
             if let Some(delivery) = live(&session.kept.subscriptions, &message) {
@@ -136,7 +142,7 @@ impl Broker {
     }
 
     /// The last will of a client.
-    pub(super) fn will_of(&self, client: Client) -> Option<&Outgoing> {
+    pub(super) fn will_of(&self, client: Client) -> Option<&Publication> {
         self.present.get(&client)?.will.as_ref()
     }
 
@@ -155,7 +161,7 @@ impl Broker {
     }
 }
 
-fn stored_for(retained: &BTreeMap<String, Outgoing>, filter: &str, qos: u8) -> impl Iterator<Item = Delivery> {
+fn stored_for(retained: &BTreeMap<String, Publication>, filter: &str, qos: u8) -> impl Iterator<Item = Delivery> {
     retained
         .values()
         .filter(|message| covers(filter, &message.topic))
@@ -167,7 +173,7 @@ fn stored_for(retained: &BTreeMap<String, Outgoing>, filter: &str, qos: u8) -> i
         })
 }
 
-fn live(subscriptions: &BTreeMap<String, u8>, message: &Outgoing) -> Option<Delivery> {
+fn live(subscriptions: &BTreeMap<String, u8>, message: &Publication) -> Option<Delivery> {
     let granted = subscriptions
         .iter()
         .filter(|(filter, _)| covers(filter, &message.topic))
@@ -185,8 +191,8 @@ fn live(subscriptions: &BTreeMap<String, u8>, message: &Outgoing) -> Option<Deli
 mod tests {
     use super::*;
 
-    fn message(topic: &str, text: &str, qos: u8, retain: bool) -> Outgoing {
-        Outgoing {
+    fn message(topic: &str, text: &str, qos: u8, retain: bool) -> Publication {
+        Publication {
             topic: topic.to_owned(),
             payload: Bytes::copy_from_slice(text.as_bytes()),
             qos,

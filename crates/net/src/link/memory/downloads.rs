@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use super::peer::PeerDownload;
 use super::{MemoryLink, Task};
 use crate::bench::Offer;
 use crate::maps;
+use tck_base::device::Download;
 use tck_journal::ServeBehaviour;
 use tck_journal::event::{Direction, Event, Source};
 
@@ -24,25 +24,15 @@ impl MemoryLink {
         let Some(offer) = self.offers.get(url).cloned() else {
             if let Some(path) = path {
                 self.fetched(step / 2, "", path, Some(404), "done");
-                self.download(
-                    step,
-                    peer,
-                    token,
-                    PeerDownload::Failed("the server answers 404".to_owned()),
-                );
+                self.download(step, peer, token, Download::Failed("the server answers 404".to_owned()));
             } else {
-                self.download(
-                    step,
-                    peer,
-                    token,
-                    PeerDownload::Failed(format!("{url} cannot be reached")),
-                );
+                self.download(step, peer, token, Download::Failed(format!("{url} cannot be reached")));
             }
             return;
         };
         let path = path.unwrap_or(url);
         let name = offer.name.as_str();
-        let failed = |text: &str| PeerDownload::Failed(text.to_owned());
+        let failed = |text: &str| Download::Failed(text.to_owned());
         match offer.behaviour {
             ServeBehaviour::Well | ServeBehaviour::WrongBytes | ServeBehaviour::Slow => {
                 let wrong = offer.behaviour == ServeBehaviour::WrongBytes;
@@ -54,9 +44,9 @@ impl MemoryLink {
                 let slow = offer.behaviour == ServeBehaviour::Slow;
                 let time = if slow { maps::SLOW_TRANSFER } else { step };
                 self.fetched(step / 2, name, path, Some(200), "begun");
-                self.download(step, peer, token, PeerDownload::Begun);
+                self.download(step, peer, token, Download::Begun);
                 self.fetched(step / 2 + time, name, path, Some(200), "done");
-                self.download(step + time, peer, token, PeerDownload::Done(body));
+                self.download(step + time, peer, token, Download::Done(body));
             }
             ServeBehaviour::NotFound => {
                 self.fetched(step / 2, name, path, Some(404), "done");
@@ -69,7 +59,7 @@ impl MemoryLink {
             }
             ServeBehaviour::Cut => {
                 self.fetched(step / 2, name, path, Some(200), "begun");
-                self.download(step, peer, token, PeerDownload::Begun);
+                self.download(step, peer, token, Download::Begun);
                 self.fetched(3 * step / 2, name, path, Some(200), "cut");
                 self.download(
                     2 * step,
@@ -92,7 +82,7 @@ impl MemoryLink {
         self.after(delay, Task::Report(Source::Maps, Some(Direction::FromDevice), event));
     }
 
-    fn download(&mut self, delay: Duration, peer: usize, token: u64, progress: PeerDownload) {
+    fn download(&mut self, delay: Duration, peer: usize, token: u64, progress: Download) {
         self.after(delay, Task::Download(peer, token, progress));
     }
 }

@@ -1,8 +1,8 @@
 //! How connections end: keep-alive, cuts, refusals, impatience; and what happens to held packets at `restore`.
 
 use super::packets::Up;
-use super::peer::PeerInput;
 use super::{MemoryLink, Task};
+use tck_base::device::Input;
 use tck_journal::event::{Close, Direction, Event, Payload, Source};
 
 impl MemoryLink {
@@ -34,7 +34,7 @@ impl MemoryLink {
             && plug.connection == Some(id)
         {
             plug.connection = None;
-            self.drive(peer, PeerInput::ConnectionLost);
+            self.drive(peer, Input::ConnectionLost);
         }
     }
 

@@ -1,6 +1,6 @@
 //! An in-process bus in virtual time: the whole bench without a network.
 //!
-//! Peers are sans-IO devices. The bus moves time from one thing that is due to the next, so that a run of
+//! Its peers are devices without sockets and clock ([`Device`]). The bus moves time from one thing that is due to the next, so that a run of
 //! minutes takes milliseconds and is the same every time. MQTT's rules are in `broker`, the way of a packet
 //! from device to broker and back, with link faults, in `traffic` and `endings`, map files in `downloads`.
 
@@ -9,7 +9,6 @@ mod connection;
 mod downloads;
 mod endings;
 mod packets;
-mod peer;
 mod random;
 #[cfg(test)]
 mod tests;
@@ -19,16 +18,16 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap, VecDeque};
 use std::time::Duration;
 
-use crate::bench::{LinkError, Offer, Outgoing};
+use crate::bench::{LinkError, Offer};
 use crate::link::Link;
 use crate::tap::faults::{Change, Faults};
 use tck_base::clock::{Moment, Stamp};
+use tck_base::device::{Device, Download, Input, Output, Publication};
 use tck_journal::Vantage;
 use tck_journal::event::{Direction, Event, LinkFault, Occurrence, Payload, Source};
 
 use connection::Connection;
 use packets::{Down, Up};
-pub use peer::{Peer, PeerConnect, PeerDownload, PeerInput, PeerOutput};
 
 /// From the broker to the harness; far below what a device can notice.
 const TO_HARNESS: Duration = Duration::from_micros(100);
@@ -78,7 +77,7 @@ enum Task {
     Ping(u64),
     GiveUp(u64),
     Lost(usize),
-    Download(usize, u64, PeerDownload),
+    Download(usize, u64, Download),
 }
 
 struct Due {
@@ -109,7 +108,7 @@ impl Ord for Due {
 
 /// A peer plugged into the bus.
 struct Plug {
-    peer: Box<dyn Peer>,
+    peer: Box<dyn Device>,
     /// Whether it belongs to the harness: no tap, no link faults, and what it publishes is reported as sent.
     own: bool,
     /// When it is to be given the time next.
@@ -141,7 +140,7 @@ impl MemoryLink {
     /// A bench at `start` with the devices under test already switched on: each is given the time once,
     /// before anything else happens.
     #[must_use]
-    pub fn new(start: Stamp, peers: Vec<Box<dyn Peer>>, options: MemoryOptions) -> Self {
+    pub fn new(start: Stamp, peers: Vec<Box<dyn Device>>, options: MemoryOptions) -> Self {
         let mut broker = broker::Broker::default();
         broker.accept(HARNESS, "", true, None);
         let filters: Vec<_> = options.device_topics.iter().map(|topic| (topic.clone(), 2)).collect();
@@ -172,14 +171,14 @@ impl MemoryLink {
     /// Adds a peer that belongs to the harness, such as a mock AGV for a master control under test. It is not
     /// behind the tap, link faults do not touch it, and what it publishes is reported as [`Event::Sent`].
     /// Returns its number for [`MemoryLink::command`].
-    pub fn add_own_peer(&mut self, peer: Box<dyn Peer>) -> usize {
+    pub fn add_own_peer(&mut self, peer: Box<dyn Device>) -> usize {
         self.plug(peer, true)
     }
 
     /// Does something to the peer with number `peer`, counted from 0 in the order of [`MemoryLink::new`].
     /// A number nobody has is ignored.
     pub fn command(&mut self, peer: usize, name: &str, value: serde_json::Value) {
-        self.drive(peer, PeerInput::Command(name.to_owned(), value));
+        self.drive(peer, Input::Command(name.to_owned(), value));
     }
 
     /// Breaks the broker: from now on the link only returns [`LinkError::Broker`].
@@ -187,7 +186,7 @@ impl MemoryLink {
         self.broken = Some(reason.to_owned());
     }
 
-    fn plug(&mut self, peer: Box<dyn Peer>, own: bool) -> usize {
+    fn plug(&mut self, peer: Box<dyn Device>, own: bool) -> usize {
         self.plugs.push(Plug {
             peer,
             own,
@@ -225,11 +224,11 @@ impl MemoryLink {
     }
 
     /// Gives a peer an input and does what it wants.
-    fn drive(&mut self, index: usize, input: PeerInput) {
+    fn drive(&mut self, index: usize, input: Input) {
         let now = self.now;
         let Some(plug) = self.plugs.get_mut(index) else { return };
         let mut wanted = Vec::new();
-        let timed = input == PeerInput::Time;
+        let timed = input == Input::Time;
         plug.peer.handle(now, input, &mut wanted);
         let earliest = if timed { now.moment + LEAST_WAKE } else { now.moment };
         plug.wake_up = plug.peer.wake_up().map(|wake_up| wake_up.max(earliest));
@@ -238,14 +237,14 @@ impl MemoryLink {
         }
     }
 
-    fn perform(&mut self, index: usize, output: PeerOutput) {
+    fn perform(&mut self, index: usize, output: Output) {
         match output {
-            PeerOutput::Publish(message) => self.publish_of(index, message),
-            PeerOutput::Fetch { token, url } => self.fetch(index, token, &url),
-            PeerOutput::Connect => self.open(index),
-            PeerOutput::Disconnect => self.close(index, true),
-            PeerOutput::Drop => self.close(index, false),
-            PeerOutput::Raw(bytes) => self.raw(index, bytes),
+            Output::Publish(message) => self.publish_of(index, message),
+            Output::Fetch { token, url } => self.fetch(index, token, &url),
+            Output::Connect => self.open(index),
+            Output::Disconnect => self.close(index, true),
+            Output::Drop => self.close(index, false),
+            Output::Raw(bytes) => self.raw(index, bytes),
         }
     }
 
@@ -268,7 +267,7 @@ impl MemoryLink {
         self.now = self.now.at(next.max(self.moment()));
         if !task_first {
             if let Some((_, index)) = wake {
-                self.drive(index, PeerInput::Time);
+                self.drive(index, Input::Time);
             }
         } else if let Some(Reverse(due)) = self.agenda.pop() {
             self.run(due.task);
@@ -285,8 +284,8 @@ impl MemoryLink {
             Task::KeepAlive(connection) => self.keep_alive(connection),
             Task::Ping(connection) => self.ping(connection),
             Task::GiveUp(connection) => self.give_up(connection),
-            Task::Lost(peer) => self.drive(peer, PeerInput::ConnectionLost),
-            Task::Download(peer, token, progress) => self.drive(peer, PeerInput::Download { token, progress }),
+            Task::Lost(peer) => self.drive(peer, Input::ConnectionLost),
+            Task::Download(peer, token, progress) => self.drive(peer, Input::Download { token, progress }),
         }
     }
 
@@ -310,7 +309,7 @@ impl Link for MemoryLink {
         self.options.vantage
     }
 
-    async fn publish(&mut self, message: Outgoing) -> Result<(), LinkError> {
+    async fn publish(&mut self, message: Publication) -> Result<(), LinkError> {
         self.check()?;
         let deliveries = self.broker.publish(message);
         self.distribute(deliveries);

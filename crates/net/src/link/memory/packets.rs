@@ -3,16 +3,15 @@
 use bytes::Bytes;
 
 use super::broker::Delivery;
-use super::peer::PeerConnect;
-use crate::bench::Outgoing;
+use tck_base::device::{ConnectOptions, Publication};
 use tck_journal::event::{Filter, Packet, Payload, Will};
 
 /// From the device.
 #[derive(Clone, Debug)]
 pub(super) enum Up {
-    Connect(PeerConnect),
+    Connect(ConnectOptions),
     Subscribe(u16, Vec<(String, u8)>),
-    Publish(Outgoing, u16, bool),
+    Publish(Publication, u16, bool),
     Ack(&'static str, u16),
     Ping,
     Disconnect,
@@ -33,7 +32,7 @@ pub(super) enum Down {
     Close,
 }
 
-pub(super) fn connect_packet(connect: &PeerConnect) -> Packet {
+pub(super) fn connect_packet(connect: &ConnectOptions) -> Packet {
     Packet::Connect {
         level: connect.level,
         client_id: connect.client_id.clone(),
@@ -50,7 +49,7 @@ pub(super) fn connect_packet(connect: &PeerConnect) -> Packet {
     }
 }
 
-fn publish_packet(message: &Outgoing, packet_id: u16, dup: bool) -> Packet {
+fn publish_packet(message: &Publication, packet_id: u16, dup: bool) -> Packet {
     Packet::Publish {
         topic: message.topic.clone(),
         qos: message.qos,
@@ -107,7 +106,7 @@ pub(super) fn down_packet(down: &Down) -> Option<Packet> {
                 retain,
             } = delivery.clone();
             publish_packet(
-                &Outgoing {
+                &Publication {
                     topic,
                     payload,
                     qos,

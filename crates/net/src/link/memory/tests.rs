@@ -5,23 +5,24 @@ use bytes::Bytes;
 
 use super::*;
 use tck_base::clock::WallClock;
+use tck_base::device::ConnectOptions;
 use tck_journal::ServeBehaviour;
 use tck_journal::event::{Close, Packet};
 
-type Log = Rc<RefCell<Vec<(Moment, PeerInput)>>>;
+type Log = Rc<RefCell<Vec<(Moment, Input)>>>;
 
 /// A peer that connects at once, again half a second after a loss, and does what its script says.
 struct Scripted {
-    script: VecDeque<(Moment, PeerOutput)>,
+    script: VecDeque<(Moment, Output)>,
     reconnect: Option<Moment>,
     keep_alive: u64,
     log: Log,
     started: bool,
 }
 
-impl Peer for Scripted {
-    fn connect(&mut self, _: Stamp) -> PeerConnect {
-        PeerConnect {
+impl Device for Scripted {
+    fn connect_options(&mut self, _: Stamp) -> ConnectOptions {
+        ConnectOptions {
             level: 4,
             client_id: "device".to_owned(),
             keep_alive: Duration::from_secs(self.keep_alive),
@@ -31,19 +32,19 @@ impl Peer for Scripted {
         }
     }
 
-    fn handle(&mut self, now: Stamp, input: PeerInput, out: &mut Vec<PeerOutput>) {
+    fn handle(&mut self, now: Stamp, input: Input, out: &mut Vec<Output>) {
         if !std::mem::replace(&mut self.started, true) {
-            out.push(PeerOutput::Connect);
+            out.push(Output::Connect);
         }
-        if input == PeerInput::ConnectionLost {
+        if input == Input::ConnectionLost {
             self.reconnect = Some(now.moment + Duration::from_millis(500));
         }
-        if input != PeerInput::Time {
+        if input != Input::Time {
             self.log.borrow_mut().push((now.moment, input));
         }
         if self.reconnect.is_some_and(|at| at <= now.moment) {
             self.reconnect = None;
-            out.push(PeerOutput::Connect);
+            out.push(Output::Connect);
         }
         while self.script.front().is_some_and(|(at, _)| *at <= now.moment) {
             out.extend(self.script.pop_front().map(|(_, output)| output));
@@ -56,8 +57,8 @@ impl Peer for Scripted {
     }
 }
 
-fn outgoing(topic: &str, text: &str, qos: u8, retain: bool) -> Outgoing {
-    Outgoing {
+fn outgoing(topic: &str, text: &str, qos: u8, retain: bool) -> Publication {
+    Publication {
         topic: topic.to_owned(),
         payload: Bytes::copy_from_slice(text.as_bytes()),
         qos,
@@ -69,8 +70,8 @@ fn ms(millis: u64) -> Moment {
     Moment::START + Duration::from_millis(millis)
 }
 
-fn publishes(at: u64, topic: &str, text: &str, qos: u8, retain: bool) -> (Moment, PeerOutput) {
-    (ms(at), PeerOutput::Publish(outgoing(topic, text, qos, retain)))
+fn publishes(at: u64, topic: &str, text: &str, qos: u8, retain: bool) -> (Moment, Output) {
+    (ms(at), Output::Publish(outgoing(topic, text, qos, retain)))
 }
 
 struct Bench {
@@ -78,11 +79,11 @@ struct Bench {
     log: Log,
 }
 
-fn bench(script: Vec<(Moment, PeerOutput)>) -> Bench {
+fn bench(script: Vec<(Moment, Output)>) -> Bench {
     bench_with(script, &MemoryOptions::default())
 }
 
-fn bench_with(script: Vec<(Moment, PeerOutput)>, options: &MemoryOptions) -> Bench {
+fn bench_with(script: Vec<(Moment, Output)>, options: &MemoryOptions) -> Bench {
     let log = Log::default();
     let peer = Scripted {
         script: script.into(),
@@ -127,7 +128,7 @@ impl Bench {
         let text = |payload: &Bytes| String::from_utf8_lossy(payload).into_owned();
         (self.log.borrow().iter())
             .filter_map(|(at, input)| match input {
-                PeerInput::Message { payload, .. } => Some((*at, text(payload))),
+                Input::Message { payload, .. } => Some((*at, text(payload))),
                 _ => None,
             })
             .collect()
@@ -137,7 +138,7 @@ impl Bench {
         self.log
             .borrow()
             .iter()
-            .filter(|(_, input)| *input == PeerInput::ConnectionLost)
+            .filter(|(_, input)| *input == Input::ConnectionLost)
             .count()
     }
 }
@@ -192,7 +193,7 @@ fn a_connection_is_reported_packet_by_packet_in_order() {
         (will.topic.as_str(), will.qos, will.retain, *keep_alive),
         ("d/connection", 1, true, 10)
     );
-    assert_eq!(bench.log.borrow()[0].1, PeerInput::Connected);
+    assert_eq!(bench.log.borrow()[0].1, Input::Connected);
 }
 
 #[test]
@@ -275,7 +276,7 @@ fn a_cut_publishes_the_will_at_once_and_keeps_the_device_out_until_restore() {
 
 #[test]
 fn disconnect_does_not_publish_the_will_and_drop_does() {
-    for (output, wills) in [(PeerOutput::Disconnect, 0), (PeerOutput::Drop, 1)] {
+    for (output, wills) in [(Output::Disconnect, 0), (Output::Drop, 1)] {
         let mut bench = bench(vec![(ms(100), output)]);
         let seen = bench.until(20_000);
         assert_eq!(messages(&seen, "d/connection").len(), wills);
@@ -386,8 +387,8 @@ fn a_duplicated_qos_2_packet_is_still_delivered_once() {
 fn refuse_leaves_the_present_connection_alone() {
     let mut bench = bench(vec![
         publishes(200, "d/state", "still here", 0, false),
-        (ms(300), PeerOutput::Drop),
-        (ms(400), PeerOutput::Connect),
+        (ms(300), Output::Drop),
+        (ms(400), Output::Connect),
     ]);
     bench.until(100);
     bench.fault(LinkFault::Refuse);
@@ -407,7 +408,7 @@ fn pings_keep_an_idle_connection_alive() {
 
 #[test]
 fn garbage_is_reported_and_costs_the_connection() {
-    let mut bench = bench(vec![(ms(100), PeerOutput::Raw(vec![0xf7, 0x02, 0x00, 0x00]))]);
+    let mut bench = bench(vec![(ms(100), Output::Raw(vec![0xf7, 0x02, 0x00, 0x00]))]);
     let seen = bench.until(400);
     assert!(kinds(&seen).contains(&"undecodable".to_owned()));
     assert!(
@@ -446,7 +447,7 @@ fn every_way_to_serve_a_file_ends_as_it_should() {
             behaviour,
         };
         let url = wait(bench.link.serve(offer)).unwrap();
-        bench.link.perform(0, PeerOutput::Fetch { token: 7, url });
+        bench.link.perform(0, Output::Fetch { token: 7, url });
         let seen = bench.until(within);
         let last = seen.iter().rev().find_map(|o| match &o.event {
             Event::Fetched { phase, name, .. } => Some((phase.clone(), name.clone())),
@@ -454,12 +455,12 @@ fn every_way_to_serve_a_file_ends_as_it_should() {
         });
         assert_eq!(last.clone().unwrap_or_default().0, phase, "{behaviour:?}");
         let end = bench.log.borrow().iter().rev().find_map(|(_, input)| match input {
-            PeerInput::Download { token: 7, progress } => Some(progress.clone()),
+            Input::Download { token: 7, progress } => Some(progress.clone()),
             _ => None,
         });
         match (end, ends) {
-            (Some(PeerDownload::Done(body)), Ok(text)) => assert_eq!(&body[..], text.as_bytes()),
-            (Some(PeerDownload::Failed(_)), Err(())) => {}
+            (Some(Download::Done(body)), Ok(text)) => assert_eq!(&body[..], text.as_bytes()),
+            (Some(Download::Failed(_)), Err(())) => {}
             other => panic!("{behaviour:?}: {other:?}"),
         }
     }
@@ -492,7 +493,7 @@ fn a_peer_of_the_harness_is_not_behind_the_tap_and_its_messages_are_reported_as_
     let mut bench = bench(vec![]);
     let script = VecDeque::from(vec![
         publishes(100, "d/state", "mock", 0, false),
-        (ms(600), PeerOutput::Drop),
+        (ms(600), Output::Drop),
     ]);
     let log = Log::default();
     let own = Scripted {
@@ -548,5 +549,5 @@ fn commands_reach_the_peer_they_name() {
         .link
         .command(0, "set-mode", serde_json::json!({ "mode": "MANUAL" }));
     bench.link.command(5, "nobody", serde_json::Value::Null);
-    assert!(matches!(&bench.log.borrow()[0].1, PeerInput::Command(name, _) if name == "set-mode"));
+    assert!(matches!(&bench.log.borrow()[0].1, Input::Command(name, _) if name == "set-mode"));
 }

@@ -11,11 +11,10 @@ use bytes::Bytes;
 use super::broker::{Client, Delivery};
 use super::connection::{Connection, Lane, next_id, take_due};
 use super::packets::{Down, Up, connect_packet, down_packet, up_packet};
-use super::peer::PeerInput;
 use super::{HARNESS, MemoryLink, TO_HARNESS, Task};
-use crate::bench::Outgoing;
 use crate::tap::faults::Fate;
 use tck_base::clock::Moment;
+use tck_base::device::{Input, Publication};
 use tck_journal::Vantage;
 use tck_journal::event::{Close, Direction, Event, Packet, Payload, Source};
 use tck_wire::Reader;
@@ -28,7 +27,7 @@ impl MemoryLink {
         self.close(peer, false);
         let now = self.now;
         let Some(plug) = self.plugs.get_mut(peer) else { return };
-        let connect = plug.peer.connect(now);
+        let connect = plug.peer.connect_options(now);
         self.opened += 1;
         let id = self.opened;
         plug.connection = Some(id);
@@ -74,7 +73,7 @@ impl MemoryLink {
         }
     }
 
-    pub(super) fn publish_of(&mut self, peer: usize, message: Outgoing) {
+    pub(super) fn publish_of(&mut self, peer: usize, message: Publication) {
         let Some(plug) = self.plugs.get(peer) else { return };
         let own = plug.own;
         let Some((id, connection)) = (plug.connection).and_then(|id| Some((id, self.connections.get_mut(&id)?))) else {
@@ -227,7 +226,7 @@ impl MemoryLink {
                     payload,
                 }) => {
                     let payload = Bytes::copy_from_slice(payload.bytes());
-                    let message = Outgoing {
+                    let message = Publication {
                         topic,
                         payload,
                         qos,
@@ -469,7 +468,7 @@ impl MemoryLink {
                 if !known {
                     self.drive(
                         peer,
-                        PeerInput::Message {
+                        Input::Message {
                             topic: delivery.topic,
                             payload: delivery.payload,
                         },
@@ -497,7 +496,7 @@ impl MemoryLink {
         {
             connection.established = true;
             let peer = connection.peer;
-            self.drive(peer, PeerInput::Connected);
+            self.drive(peer, Input::Connected);
         }
     }
 

@@ -8,9 +8,10 @@ use crate::link::filter::covers;
 use tck_base::clock::Moment;
 use tck_journal::event::{Close, Direction, Event, LinkFault, Occurrence, Packet, Source};
 
-/// How long a broker may take to deliver a message to the device …
+/// How long a broker may take to deliver a message to the device.
 const TO_DEVICE: Duration = Duration::from_secs(5);
-/// … and to the harness: less than what is still allowed to a device that has to publish something on an event.
+/// How long a broker may take to deliver a message to the harness: less than what is still allowed to a device that has to
+/// publish something on an event.
 const TO_HARNESS: Duration = Duration::from_secs(3);
 
 /// A message that did not arrive.
@@ -20,11 +21,11 @@ pub(super) enum Undelivered {
     ToDevice(String),
     /// The device has published something.
     ToHarness {
-        /// On this topic.
+        /// Topic of the message.
         topic: String,
-        /// Under this client id …
+        /// Client id of the device.
         client: String,
-        /// … and this user name.
+        /// User name of the device.
         user: Option<String>,
         /// Whether something of it was delivered on this topic before.
         delivered_before: bool,

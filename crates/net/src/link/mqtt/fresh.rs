@@ -1,18 +1,18 @@
-//! A new client that looks what the broker has stored.
+//! Asks the broker, by a client of its own, what it has stored.
 
 use std::time::Duration;
 
-use crate::bench::Outgoing;
 use crate::bench::client::{Client, ClientEvent, ClientOptions};
 use crate::bench::inbox::Reporter;
+use tck_base::device::Publication;
 use tck_journal::event::{Direction, Event, Payload, Source};
 
-/// So often a new client looks before it says that nothing is stored.
+/// How often a new client looks before it says that nothing is stored.
 const LOOKS: u32 = 3;
-/// So long it leaves the broker between two looks.
+/// How long it leaves the broker between two looks.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(100);
 
-/// So long it waits for what is stored where the broker allows no topic that would tell the end.
+/// How long it waits for what is stored where the broker allows no topic that would tell the end.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Looks with a new client what the broker has stored, and reports it. A broker that is just replacing a stored message
@@ -61,7 +61,7 @@ async fn look_once(
                     until = Some(tokio::time::Instant::now() + PATIENCE);
                     continue;
                 };
-                let marker = Outgoing {
+                let marker = Publication {
                     topic: end.to_owned(),
                     payload: bytes::Bytes::new(),
                     qos: 1,

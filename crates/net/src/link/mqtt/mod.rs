@@ -19,7 +19,7 @@ use crate::bench::endpoint::Endpoint;
 use crate::bench::inbox::Inbox;
 use crate::bench::kin::Kin;
 use crate::bench::own::{OwnNames, User};
-use crate::bench::{LinkError, Offer, Outgoing};
+use crate::bench::{LinkError, Offer};
 use crate::broker::EmbeddedBroker;
 use crate::link::Link;
 use crate::maps::MapServer;
@@ -30,6 +30,7 @@ use lag::{LAG, lag_of};
 use options::ANSWER_LIMIT;
 use standing::{own_client, probe_topic, user};
 use tck_base::clock::{Moment, Stamp, WallClock};
+use tck_base::device::Publication;
 use tck_journal::Vantage;
 use tck_journal::event::{Event, LinkFault, Occurrence};
 
@@ -169,7 +170,7 @@ impl MqttLink {
         Ok(next)
     }
 
-    fn send(&mut self, message: Outgoing) -> Result<(), LinkError> {
+    fn send(&mut self, message: Publication) -> Result<(), LinkError> {
         self.check()?;
         if self.client.publish(message) {
             return Ok(());
@@ -188,7 +189,7 @@ impl Link for MqttLink {
         self.vantage
     }
 
-    async fn publish(&mut self, message: Outgoing) -> Result<(), LinkError> {
+    async fn publish(&mut self, message: Publication) -> Result<(), LinkError> {
         let now = self.clock.now().moment;
         if let Some(delivery) = &mut self.delivery {
             delivery.sent(&message.topic, now);
@@ -269,7 +270,7 @@ impl Link for MqttLink {
             // It would never come back; what waits for it says that nothing is known.
             return self.check().map(|()| probe);
         }
-        self.send(Outgoing {
+        self.send(Publication {
             topic: probe_topic(&self.own, &self.run),
             payload: probe.to_string().into(),
             qos: 1,

@@ -78,7 +78,7 @@ impl BenchOptions {
 pub struct BenchInfo {
     /// `host:port` the device connects to: the tap, or the broker when there is no tap.
     pub device_address: String,
-    /// The same as a URL, at an address that others reach.
+    /// URL the device connects to, with an address that others reach.
     pub device_url: String,
     /// `host:port` of the broker.
     pub broker_address: String,

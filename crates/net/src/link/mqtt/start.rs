@@ -8,9 +8,10 @@ use super::echo::Echo;
 use super::lag::watch_lag;
 use super::options::{BenchInfo, BenchOptions, BrokerChoice, tap_url};
 use super::standing::{listen, probe_topic, standing, without_echo, without_own_topics};
+use crate::bench::LinkError;
 use crate::bench::endpoint::Endpoint;
 use crate::bench::inbox::inbox;
-use crate::bench::{LinkError, tls};
+use crate::bench::secure::TlsServer;
 use crate::broker::{EmbeddedBroker, Tested, self_test};
 use crate::maps::MapServer;
 use crate::tap::{Tap, Upstream};
@@ -28,7 +29,7 @@ impl MqttBench {
     /// [`LinkError::Setup`] when certificates do not work or the broker fails its self-test.
     pub async fn start(options: BenchOptions) -> Result<(MqttLink, BenchInfo), LinkError> {
         let (reporter, inbox) = inbox(options.clock);
-        let tls = options.tls.as_ref().map(tls::server).transpose()?;
+        let tls = options.tls.as_ref().map(TlsServer::new).transpose()?;
         let (embedded, endpoint) = match &options.broker {
             BrokerChoice::Embedded => {
                 let broker = EmbeddedBroker::start().await?;

@@ -1,4 +1,4 @@
-//! A rule for the next so many PUBLISH packets on a topic; `drop` and `duplicate` are made of these.
+//! `drop` and `duplicate`: the next *n* PUBLISH packets on a topic are swallowed, or sent twice.
 
 use super::applies;
 use tck_journal::event::Direction;
@@ -41,5 +41,38 @@ impl Counted {
             self.rules.remove(index);
         }
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::tap::faults::{Fate, Faults};
+    use tck_journal::event::{Direction, LinkFault};
+
+    #[test]
+    fn only_the_next_packets_on_the_topic_are_touched() {
+        let topic = Some("state".to_owned());
+        let direction = Some(Direction::FromDevice);
+        let count = 2;
+        let drop = LinkFault::Drop {
+            topic: topic.clone(),
+            count,
+            direction,
+        };
+        let duplicate = LinkFault::Duplicate {
+            topic,
+            count,
+            direction,
+        };
+        for (fault, fated) in [(drop, Fate::Swallow), (duplicate, Fate::Twice)] {
+            let mut faults = Faults::default();
+            faults.apply(&fault);
+            let mut fate = |direction, topic| faults.fate_of_publish(direction, topic);
+            assert_eq!(fate(Direction::FromDevice, "a/b/order"), Fate::Forward);
+            assert_eq!(fate(Direction::ToDevice, "a/b/state"), Fate::Forward);
+            assert_eq!(fate(Direction::FromDevice, "a/b/state"), fated);
+            assert_eq!(fate(Direction::FromDevice, "a/c/state"), fated);
+            assert_eq!(fate(Direction::FromDevice, "a/b/state"), Fate::Forward);
+        }
     }
 }

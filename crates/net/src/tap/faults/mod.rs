@@ -6,8 +6,6 @@
 mod counted;
 mod cut;
 mod delay;
-mod drop;
-mod duplicate;
 mod refuse;
 mod restore;
 mod silence;
@@ -16,6 +14,7 @@ use std::time::Duration;
 
 use tck_journal::event::{Direction, LinkFault};
 
+use counted::Counted;
 pub use cut::abort;
 
 /// What becomes of a packet.
@@ -47,8 +46,8 @@ pub struct Faults {
     refuse: refuse::Refuse,
     silence: silence::Silence,
     delay: delay::Delay,
-    drop: drop::Drop,
-    duplicate: duplicate::Duplicate,
+    drop: Counted,
+    duplicate: Counted,
 }
 
 impl Faults {
@@ -62,13 +61,13 @@ impl Faults {
                 topic,
                 count,
                 direction,
-            } => self.drop.begin(topic.as_deref(), *count, *direction),
+            } => self.drop.add(topic.as_deref(), *count, *direction),
             LinkFault::Duplicate {
                 topic,
                 count,
                 direction,
             } => {
-                self.duplicate.begin(topic.as_deref(), *count, *direction);
+                self.duplicate.add(topic.as_deref(), *count, *direction);
             }
             LinkFault::Refuse => self.refuse.begin(),
             LinkFault::Restore => restore::all(self),
@@ -96,9 +95,9 @@ impl Faults {
 
     /// What becomes of a PUBLISH on `topic`. Counts it.
     pub fn fate_of_publish(&mut self, direction: Direction, topic: &str) -> Fate {
-        if self.drop.takes(direction, topic) {
+        if self.drop.take(direction, topic) {
             Fate::Swallow
-        } else if self.duplicate.takes(direction, topic) {
+        } else if self.duplicate.take(direction, topic) {
             Fate::Twice
         } else {
             Fate::Forward

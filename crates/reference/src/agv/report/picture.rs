@@ -148,10 +148,12 @@ impl Agv {
     }
 
     fn safety(&self) -> Value {
-        let emergency_stop = match () {
-            () if self.holds.emergency => "MANUAL",
-            () if self.holds.field => "AUTOACK",
-            () => "NONE",
+        let emergency_stop = if self.holds.emergency {
+            "MANUAL"
+        } else if self.holds.field {
+            "AUTOACK"
+        } else {
+            "NONE"
         };
         json!({ "eStop": emergency_stop, "fieldViolation": self.holds.field })
     }

@@ -356,7 +356,10 @@ fn a_payload_is_published_once_and_a_retained_one_is_put_right() {
         (&json!("OFFLINE"), &json!("agv-1"))
     );
     bench.command("publish", json!({ "topic": "state", "text": "{\"headerId\":" }));
-    assert_eq!(bench.publications("/state").last().unwrap().payload, b"{\"headerId\":");
+    assert_eq!(
+        bench.publications("/state").last().unwrap().payload,
+        b"{\"headerId\":".as_slice()
+    );
     bench.command("well-behaved", json!({}));
     assert_eq!(bench.messages("/connection").len(), usual + 2);
     assert_eq!(

@@ -208,7 +208,7 @@ fn acknowledge(agv: &mut Agv) {
     if let Some(topic) = agv.config.topic("instantActions").filter(|_| agv.connection.online) {
         agv.pending.push(Output::Publish(Publication {
             topic: topic.to_owned(),
-            payload: Value::Object(message).to_string().into_bytes(),
+            payload: Value::Object(message).to_string().into(),
             qos: 0,
             retain: false,
         }));

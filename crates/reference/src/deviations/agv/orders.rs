@@ -336,7 +336,7 @@ fn echo(agv: &mut Agv, adoption: &Adoption<'_>) {
     if let Some(topic) = agv.config.topic("order").filter(|_| agv.connection.online) {
         agv.pending.push(Output::Publish(Publication {
             topic: topic.to_owned(),
-            payload: adoption.message.to_string().into_bytes(),
+            payload: adoption.message.to_string().into(),
             qos: 0,
             retain: false,
         }));

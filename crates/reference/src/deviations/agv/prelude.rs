@@ -131,7 +131,7 @@ pub(super) fn will(change: fn(&mut Object)) -> Box<Hooks<fn(&mut Object)>> {
             && let Ok(mut words) = serde_json::from_slice(&will.payload)
         {
             change(&mut words);
-            will.payload = Value::Object(words).to_string().into_bytes();
+            will.payload = Value::Object(words).to_string().into();
         }
     })
 }

@@ -19,7 +19,7 @@ records! {
         => connecting(|site, _, options| {
             options.will = Some(Publication {
                 topic: format!("{}/status", site.config.name),
-                payload: b"offline".to_vec(),
+                payload: bytes::Bytes::from_static(b"offline"),
                 qos: 1,
                 retain: true,
             });
@@ -37,7 +37,7 @@ records! {
             });
             options.will = vehicle.topic("connection").map(|topic| Publication {
                 topic: topic.to_owned(),
-                payload: message.to_string().into_bytes(),
+                payload: message.to_string().into(),
                 qos: 1,
                 retain: true,
             });

@@ -48,11 +48,11 @@ struct Persona {
     answers_after: Option<Duration>,
     /// At least so long between two states.
     state_interval: Duration,
-    /// So many states are lost on the way.
+    /// How many states are lost on the way.
     lost_states: u64,
     /// It publishes no state.
     silent: bool,
-    /// So many orders are ignored.
+    /// How many orders are ignored.
     ignored_orders: u64,
     new_orders: Option<Rejection>,
     updates: Option<Rejection>,

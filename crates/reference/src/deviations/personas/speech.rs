@@ -59,7 +59,7 @@ impl Persona {
         if let Some(topic) = agv.config.topic(name).filter(|_| agv.connection.online) {
             let publication = Publication {
                 topic: topic.to_owned(),
-                payload: text.into_bytes(),
+                payload: text.into(),
                 qos: u8::from(name == "connection"),
                 retain: retained && (name == "connection" || agv.config.has("retainedFactsheet")),
             };

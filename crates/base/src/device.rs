@@ -1,18 +1,17 @@
-//! What a device looks like from the in-memory bus.
+//! A device seen from what connects it to a broker: what it is told, and what it wants done.
 //!
-//! This mirrors the sans-IO devices of `reference`, which a link must not know; `run::device_peer` joins the two.
+//! The reference devices are such devices. The in-memory link and the driver over sockets know no more of them.
 
 use std::time::Duration;
 
 use bytes::Bytes;
 
-use crate::bench::Outgoing;
-use tck_base::clock::{Moment, Stamp};
+use crate::clock::{Moment, Stamp};
 
-/// How a peer opens its MQTT connection.
+/// Options with which a device opens its MQTT connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PeerConnect {
-    /// MQTT protocol level: 4 is MQTT 3.1.1.
+pub struct ConnectOptions {
+    /// MQTT protocol level: 4 is MQTT 3.1.1. Links over real sockets speak no other.
     pub level: u8,
     /// Client identifier.
     pub client_id: String,
@@ -21,17 +20,30 @@ pub struct PeerConnect {
     /// Clean session.
     pub clean_session: bool,
     /// The last will.
-    pub will: Option<Outgoing>,
+    pub will: Option<Publication>,
     /// Topic filters and QoS, subscribed right after the connection is accepted.
     pub subscriptions: Vec<(String, u8)>,
 }
 
-/// What happens to a peer.
+/// A message to be published.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Publication {
+    /// Full topic.
+    pub topic: String,
+    /// Payload.
+    pub payload: Bytes,
+    /// QoS.
+    pub qos: u8,
+    /// RETAIN.
+    pub retain: bool,
+}
+
+/// Event that a device is told.
 #[derive(Clone, Debug, PartialEq)]
-pub enum PeerInput {
+pub enum Input {
     /// The connection was accepted and the subscriptions acknowledged.
     Connected,
-    /// The connection is gone, or an attempt failed. Not given after the peer's own `Disconnect` or `Drop`.
+    /// The connection is gone, or an attempt failed. Not given after the device's own `Disconnect` or `Drop`.
     ConnectionLost,
     /// A message was delivered.
     Message {
@@ -47,15 +59,15 @@ pub enum PeerInput {
         /// The token of the request.
         token: u64,
         /// What happened.
-        progress: PeerDownload,
+        progress: Download,
     },
-    /// A person or a test does something to the device.
+    /// A person or a test does something to the vehicle.
     Command(String, serde_json::Value),
 }
 
 /// Progress of a download.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum PeerDownload {
+pub enum Download {
     /// The server answers and the first byte is here.
     Begun,
     /// All bytes are here.
@@ -64,11 +76,11 @@ pub enum PeerDownload {
     Failed(String),
 }
 
-/// What a peer wants done.
+/// Request of a device to its driver.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum PeerOutput {
-    /// Publish a message; lost while there is no connection.
-    Publish(Outgoing),
+pub enum Output {
+    /// Publish a message. Dropped by the driver while there is no connection.
+    Publish(Publication),
     /// Fetch a file over HTTP.
     Fetch {
         /// Token that comes back with the progress.
@@ -76,24 +88,24 @@ pub enum PeerOutput {
         /// Address.
         url: String,
     },
-    /// Open a connection with what [`Peer::connect`] then says.
+    /// Open a connection with what [`Device::connect_options`] then says.
     Connect,
     /// Send DISCONNECT and close.
     Disconnect,
     /// Close without DISCONNECT.
     Drop,
-    /// Send these bytes on the raw connection.
+    /// Send these bytes on the raw connection (a defect that no client library can produce).
     Raw(Vec<u8>),
 }
 
-/// A sans-IO device on the bus.
-pub trait Peer {
+/// A device as a state machine without sockets and clock.
+pub trait Device {
     /// How to connect now. Called at every connection attempt.
-    fn connect(&mut self, now: Stamp) -> PeerConnect;
+    fn connect_options(&mut self, now: Stamp) -> ConnectOptions;
 
     /// Takes an input; appends what is to be done to `out`, in order.
-    fn handle(&mut self, now: Stamp, input: PeerInput, out: &mut Vec<PeerOutput>);
+    fn handle(&mut self, now: Stamp, input: Input, out: &mut Vec<Output>);
 
-    /// When it next wants [`PeerInput::Time`]; `None` while it waits for something else.
+    /// When it next wants [`Input::Time`]; `None` while it waits for something else.
     fn wake_up(&self) -> Option<Moment>;
 }
