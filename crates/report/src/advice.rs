@@ -32,7 +32,10 @@ pub fn advice(reason: &str) -> String {
         .strip_prefix("there is no factsheet that could say whether it has: ")
         .or_else(|| reason.strip_prefix("the factsheet has no list that could say whether it has: "))
     {
-        return format!("[device] claims: say whether the device has `{name}`, or let its factsheet say it");
+        if name.starts_with("limit ") {
+            return format!("[device] claims = [\"{name} = …\"]: say it, or let its factsheet say it");
+        }
+        return format!("[device] claims = [\"{name}\"], or [\"no {name}\"]: say it, or let its factsheet say it");
     }
     reason.to_owned()
 }
@@ -67,6 +70,10 @@ mod tests {
         assert!(advice(statement).starts_with("device.node-bound = true or false"));
         let motion = "the profile does not allow motion ([motion] allowed = true)";
         assert!(advice(motion).starts_with("[motion] allowed = true: "));
+        let capability = "there is no factsheet that could say whether it has: action pick NODE";
+        assert!(
+            advice(capability).starts_with("[device] claims = [\"action pick NODE\"], or [\"no action pick NODE\"]")
+        );
         assert_eq!(advice("the vehicle stood in the way"), "the vehicle stood in the way");
     }
 }

@@ -98,11 +98,6 @@ fn cause(reason: &str, known: &[(String, Group<'_>)]) -> String {
     if let Some((_, shared)) = reason.split_once(SHARED) {
         return shared.split([')', ' ']).next().unwrap_or(shared).to_owned();
     }
-    // What a factsheet, a profile or a site lacks is one cause, whatever for.
-    let kind = reason
-        .split_once(": ")
-        .filter(|(kind, _)| kind.starts_with("there is no "));
-    let reason = kind.map_or(reason, |(kind, _)| kind);
     let words = reason.split_whitespace();
     let steady = words.filter(|word| !word.contains(|character: char| character.is_ascii_digit()));
     steady.collect::<Vec<_>>().join(" ")
@@ -143,6 +138,15 @@ mod tests {
         ]);
         assert_eq!(three[0], three[1]);
         assert_ne!(three[0], three[2]);
+    }
+
+    #[test]
+    fn each_thing_that_a_factsheet_would_say_is_a_cause() {
+        let two = causes(&[
+            "there is no factsheet that could say whether it has: action pick NODE",
+            "there is no factsheet that could say whether it has: action stateRequest INSTANT",
+        ]);
+        assert_ne!(two[0], two[1]);
     }
 
     #[test]
