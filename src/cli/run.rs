@@ -116,7 +116,8 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
         return job.plan(arguments, built_in, &surroundings);
     }
     if job.certifies && !built_in {
-        let plan = job.of_profile(arguments, &surroundings)?;
+        let mut plan = job.of_profile(arguments, &surroundings)?;
+        plan.overhear(&job.pack).map_err(|error| job.could_not_begin(error))?;
         super::plan::complete(&job.planned(plan))?;
     }
     let runtime = tokio::runtime::Builder::new_multi_thread()
@@ -230,7 +231,12 @@ impl Job {
         if self.no_motion {
             run.device.stand_still(Reason::MotionRuledOut);
         }
-        super::plan::show(&self.planned(run), self.output.format)
+        run.overhear(&self.pack).map_err(|error| self.could_not_begin(error))?;
+        let plan = self.planned(run);
+        if let Some(file) = &arguments.selection.floor {
+            super::plan::draw(&plan, file)?;
+        }
+        super::plan::show(&plan, self.output.format)
     }
 
     fn planned(&self, mut run: SocketRun) -> RunPlan {
