@@ -15,6 +15,7 @@ use super::gone::Gone;
 use super::hidden::{Hidden, Open, hide};
 use super::own_errors::{is_refused, reported};
 use super::scene::Scene;
+use super::sent::sent;
 use super::step::{Evaluator, Holds, Position, Progress, StepOutcome, Timing};
 use super::timeline::Timeline;
 use tck_base::clock::Moment;
@@ -25,7 +26,7 @@ use tck_check::Check;
 use tck_journal::event::{Event, StepEnd, Waiver};
 use tck_journal::{Entry, Reason};
 use tck_pack::{Catalogue, Pack, Role};
-use tck_result::{Decision, StepResult, TestResult, Waited};
+use tck_result::{Decision, Sent, StepResult, TestResult, Waited};
 use tck_suite::model::{Section, Step, Test, Verb};
 use tck_world::Setting;
 
@@ -113,6 +114,8 @@ pub struct TestJudge {
     /// Clauses of the steps that have ended. What another finding hides is known when the test is over, and nothing is
     /// decided before.
     open: Vec<Open>,
+    /// What was sent last.
+    sent: Option<Sent>,
     ended: bool,
 }
 
@@ -167,6 +170,7 @@ impl TestJudge {
             interrupted: None,
             hidden: Vec::new(),
             open: Vec::new(),
+            sent: None,
             ended: false,
         }
     }
@@ -321,6 +325,10 @@ impl TestJudge {
             StepEnd::Refused(why) | StepEnd::Skipped(why) => self.refused(section, &step, why),
             _ => {}
         }
+        if let Verb::Send(send) = &step.verb {
+            let since = self.entries.partition_point(|entry| entry.seq() < begun.0);
+            self.sent = sent(send, self.entries[since..].iter(), &self.bindings);
+        }
         for (name, value) in &outcome.saves {
             self.bindings.set(name, value.clone());
         }
@@ -383,6 +391,7 @@ impl TestJudge {
                     walks: matches!(step.verb, Verb::Action(_)),
                     ended: entry.seq(),
                     waited,
+                    sent: self.sent.clone(),
                     of_time,
                     refused: ground.role == Role::Agv && is_refused(timeline, self.mark),
                 });
@@ -495,7 +504,7 @@ impl TestJudge {
         let mut open = std::mem::take(&mut self.open);
         let hidden = hide(&mut open, &self.hidden);
         for open in open {
-            let decision = decide(open.clause, &open.path, open.waited, &ground.catalogue, &ground.pack);
+            let decision = decide(open, &ground.catalogue, &ground.pack);
             self.push(decision);
         }
         let why = match (&self.trouble, &self.preamble, &self.body) {

@@ -47,7 +47,7 @@ struct Reader<'a> {
     problems: &'a mut Vec<Diagnostic>,
 }
 
-const KEYS: [&str; 11] = [
+const KEYS: [&str; 13] = [
     "id",
     "text",
     "role",
@@ -58,6 +58,8 @@ const KEYS: [&str; 11] = [
     "observe",
     "needs",
     "interpretation",
+    "because",
+    "otherwise",
     "link",
 ];
 
@@ -77,6 +79,17 @@ impl Reader<'_> {
             .iter()
             .filter_map(|need| self.as_text(need))
             .collect();
+        for reason in ["because", "otherwise"] {
+            if let Some(said) = node.get(reason).filter(|_| node.get("interpretation").is_none()) {
+                let title = format!("`{reason}` without an interpretation");
+                self.problem(
+                    said,
+                    &title,
+                    "there is no ruling",
+                    "write `interpretation`, or take this out",
+                );
+            }
+        }
         let requirement = Requirement {
             id: RequirementId::from(id.as_str()),
             group: group.to_owned(),
@@ -89,6 +102,8 @@ impl Reader<'_> {
             observe: self.text(node, "observe")?,
             needs,
             interpretation: node.get("interpretation").and_then(|text| self.as_text(text)),
+            because: node.get("because").and_then(|text| self.as_text(text)),
+            otherwise: node.get("otherwise").and_then(|text| self.as_text(text)),
             link: node.get("link").and_then(|link| self.link(link)),
         };
         Some((place.span.clone(), requirement))
