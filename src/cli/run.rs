@@ -179,6 +179,9 @@ fn asked(arguments: &args::Run, earlier: Option<&Earlier>) -> RequestBuilder {
     if arguments.certifies {
         asked = asked.certifies();
     }
+    if let Some(budget) = arguments.budget {
+        asked = asked.budget(budget);
+    }
     if wanted.fail_fast {
         asked = asked.fail_fast();
     }
@@ -271,6 +274,7 @@ impl Job {
         self.is_resumable(&AboutRun {
             subject: device.subject(),
             vantage: Vantage::Tap.word(),
+            mode: mode(self.certifies),
             settings: &settings,
             files: &BTreeMap::new(),
         })?;
@@ -288,6 +292,7 @@ impl Job {
         run.command.clone_from(&self.request.command);
         run.fail_fast = self.request.fail_fast;
         run.repeat = self.request.repeat;
+        run.budget = self.request.budget;
         run.limits.clone_from(&self.request.limits);
         run.settings = settings;
         run.earlier = self.earlier.as_ref().map(|earlier| earlier.journal.clone());
@@ -380,6 +385,7 @@ impl Job {
             let about = AboutRun {
                 subject: &run.device.subject,
                 vantage: vantage.word(),
+                mode: mode(self.certifies),
                 settings: &run.device.settings,
                 files: &run.device.files,
             };
@@ -489,6 +495,11 @@ impl Job {
         });
         Ok(followed)
     }
+}
+
+/// Which command a run is of, as its header says.
+fn mode(certifies: bool) -> Option<&'static str> {
+    certifies.then_some(tck_result::CERTIFY)
 }
 
 /// A complaint with the line of the profile as it may be read by anybody: an address may hold a token.

@@ -70,24 +70,6 @@ impl Ground {
     }
 }
 
-/// What is only preferred by a ruling of the catalogue: broken is a warning.
-fn of_preference(holds: Holds) -> Holds {
-    match holds {
-        Holds::No => Holds::Softly,
-        other => other,
-    }
-}
-
-/// How a precondition comes out that is itself an obligation: it is broken when what is seen contradicts it. Coming late is
-/// no matter of it, and nothing at all shows nothing.
-fn of_precondition(holds: Holds, seen: u64) -> Holds {
-    match holds {
-        Holds::Late | Holds::Softly => Holds::Yes,
-        Holds::No if seen == 0 => Holds::Unseen("nothing came that could have shown it".to_owned()),
-        other => other,
-    }
-}
-
 /// A test being judged.
 pub struct TestJudge {
     test: Arc<Test>,
@@ -368,7 +350,7 @@ impl TestJudge {
             for mut clause in outcome.clauses {
                 if owed {
                     clause.word = "owes";
-                    clause.holds = of_precondition(clause.holds, outcome.seen);
+                    clause.holds = clause.holds.of_precondition(outcome.seen);
                 }
                 // A walk that went wrong, or a message that shows what it must not, is no matter of time.
                 let of_time = match (&clause.holds, &outcome.timing) {
@@ -382,7 +364,7 @@ impl TestJudge {
                 };
                 if step.prefers && clause.word == "checks" {
                     clause.word = "prefers";
-                    clause.holds = of_preference(clause.holds);
+                    clause.holds = clause.holds.of_preference();
                 }
                 let waited = (clause.witness.is_none()).then(|| waited.clone());
                 self.open.push(Open {

@@ -33,6 +33,9 @@ pub(super) fn remedy(reason: &Reason) -> Option<String> {
             };
             format!("[device] claims = {claims}: say it, or let its factsheet say it")
         }
+        Reason::OverBudget { .. } => {
+            "give the run more time (--budget), or go on with what is left (--resume)".to_owned()
+        }
         Reason::NobodyToAsk { .. }
         | Reason::NothingForHook { .. }
         | Reason::SampleDenied { .. }

@@ -176,6 +176,12 @@ impl RunResult {
         self.mode.as_deref() == Some(CERTIFY)
     }
 
+    /// Whether tests were left out because there was no time for them: they can be carried out later.
+    #[must_use]
+    pub fn ran_out_of_time(&self) -> bool {
+        self.tests.iter().any(TestResult::ran_out_of_time)
+    }
+
     /// The value of a setting, if it is set.
     #[must_use]
     pub fn setting(&self, name: &str) -> Option<&str> {
@@ -302,6 +308,12 @@ impl TestResult {
         let mut done = self.repetitions.iter().filter(|one| one.was_done());
         let first = done.next();
         first.is_some_and(|first| done.any(|other| other.verdict != first.verdict))
+    }
+
+    /// Whether it was left out, or not repeated, because there was no time for it.
+    #[must_use]
+    pub fn ran_out_of_time(&self) -> bool {
+        matches!(self.cause, Some(Reason::OverBudget { .. }))
     }
 
     /// How many of its repetitions were asked for and not carried out.
@@ -449,7 +461,11 @@ impl NearestMiss {
     /// The path, or that it is the message itself.
     #[must_use]
     pub fn place(&self) -> &str {
-        if self.path.is_empty() { "the message" } else { &self.path }
+        if self.path.is_empty() {
+            "the message"
+        } else {
+            &self.path
+        }
     }
 }
 

@@ -54,6 +54,8 @@ pub struct Setup {
     pub fail_fast: bool,
     /// How often each test is run.
     pub repeat: u32,
+    /// How long the run may take; tests that do not fit into it are left out.
+    pub budget: Option<Duration>,
 }
 
 /// A finished run.
@@ -245,6 +247,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
     }
 
     async fn carry_out(mut self, saved: &mut dyn FnMut(&RunJudge)) -> Result<End, EngineError> {
+        let run_begun = self.engine.link.now().moment;
         let admitted = self.admit().await?;
         self.draw();
         if let Err(why) = admitted {
@@ -271,13 +274,14 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         let mut plan = self.plan(gates.collect());
         self.record_plan(&plan)?;
         self.progress.planned(&plan);
-        self.tell_estimate(&plan);
+        self.estimate(&plan);
         let tests = self.setup.tests.clone();
         let runs = plan.tests.iter().filter(|planned| planned.gate == Gate::Runs).count();
         let runs = runs * self.setup.repeat as usize;
         let mut number = 0;
         let mut gone: Option<String> = None;
         let mut failed: Option<String> = None;
+        let mut without_time = 0;
         for (at, test) in tests.iter().enumerate() {
             if plan.tests[at].gate != Gate::Runs {
                 continue;
@@ -291,6 +295,14 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             }
             for repetition in 1..=self.setup.repeat {
                 if self.engine.interrupted() || failed.is_some() || repetition > 1 && gone.is_some() {
+                    break;
+                }
+                if let Some(why) = self.over_budget(at, run_begun) {
+                    if without_time == 0 {
+                        self.progress.note("tests that do not fit into the budget any more are left out");
+                    }
+                    without_time += 1;
+                    plan.tests[at].gate = Gate::Unobservable(why);
                     break;
                 }
                 self.engine.repetition = (self.setup.repeat > 1).then_some(repetition);
@@ -337,6 +349,10 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             let limit = format!("No test was run after {first}, which failed (--fail-fast).");
             self.setup.limits.push(limit);
         }
+        if without_time > 0 {
+            let limit = format!("Of the selected tests {without_time} had no time (--budget): they were not carried out.");
+            self.setup.limits.push(limit);
+        }
         if let (Some(why), None) = (&gone, self.stopped()) {
             self.record_plan(&plan)?;
             return Ok(End::Lost(why.clone()));
@@ -366,9 +382,10 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         flooded.or(self.engine.interrupted().then_some(End::Interrupted))
     }
 
-    /// Says how long the run will take; in virtual time it is over before that is read.
-    fn tell_estimate(&mut self, plan: &Plan) {
-        if self.engine.operator.runs_on_the_link() {
+    /// Estimates how long the run will take, and says so; in virtual time it is over before that is read.
+    fn estimate(&mut self, plan: &Plan) {
+        let is_virtual = self.engine.operator.runs_on_the_link();
+        if is_virtual && self.setup.budget.is_none() {
             return;
         }
         let times = self.engine.recorder.judge().ground().bindings.get("time");
@@ -388,10 +405,23 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         let planned = each.iter().flatten().sum::<Duration>() * self.setup.repeat;
         self.outlook = Outlook::of(planned, runs * self.setup.repeat);
         self.estimates = each.into_iter().map(Option::unwrap_or_default).collect();
+        if is_virtual {
+            return;
+        }
         self.progress.note(&format!(
             "estimated time: {} (more if the device is slow)",
             estimate::in_words(self.outlook.left())
         ));
+    }
+
+    /// Why there is no time any more for the test at this place of the plan.
+    fn over_budget(&self, at: usize, run_begun: Moment) -> Option<Reason> {
+        let budget = self.setup.budget?;
+        let spent = self.engine.link.now().moment.since(run_begun);
+        let planned = self.estimates.get(at).copied().unwrap_or_default();
+        (spent + self.outlook.of_one(planned) > budget).then_some(Reason::OverBudget {
+            budget: budget.as_secs(),
+        })
     }
 
     /// Says how much of the run is left, once a test is over that was begun then.
