@@ -30,6 +30,7 @@ pub fn certify(arguments: &args::Certify, outputs: &Outputs<'_>) -> Result<Exit,
         },
         output: arguments.output.clone(),
         pipeline: arguments.pipeline.clone(),
+        people: arguments.people.clone(),
         selection: args::SelectionArgs {
             resume: arguments.resume.clone(),
             ..args::SelectionArgs::default()

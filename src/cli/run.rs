@@ -4,7 +4,6 @@ mod conclude;
 mod resume;
 
 use std::collections::BTreeMap;
-use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -39,8 +38,8 @@ use tck_pack::{Pack, Role};
 use tck_profile::{self as profile, Effective, Surroundings};
 use tck_report::statement::many;
 use tck_run::{
-    Bundle, Criteria, Hold, LATEST, Person, Place, Request, RequestBuilder, RunError, RunPlan, SocketRun, VirtualRun,
-    going_on_at, pack_of, run_virtually, write_result,
+    Answering, AnsweringError, Bundle, Criteria, Hold, LATEST, Person, Place, Request, RequestBuilder, RunError,
+    RunPlan, SocketRun, VirtualRun, going_on_at, pack_of, run_virtually, write_result,
 };
 use tck_simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
 
@@ -132,6 +131,13 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
         job.desk = ending.desk.clone();
         job.quit = Some(ending.quit);
         desk = job.desk.clone();
+        let answering = match &arguments.people.questions {
+            Some(listen) => Some(Answering::start(listen, desk.board()).await.map_err(not_answering)?),
+            None => None,
+        };
+        if let Some(answering) = &answering {
+            eprintln!("questions are answered at {} (docs/events.md)", answering.url());
+        }
         if arguments.in_virtual_time {
             job.virtually(arguments, interrupt, outputs).await
         } else if built_in {
@@ -198,10 +204,9 @@ pub(super) fn hold(desk: &Desk) -> Hold {
     }
 }
 
-/// The desk, where somebody sits there who can be asked.
-pub(super) fn person(desk: &Desk) -> Option<Arc<dyn Person>> {
-    let attended = std::io::stdin().is_terminal() && std::io::stderr().is_terminal();
-    attended.then(|| Arc::new(desk.clone()) as Arc<dyn Person>)
+/// The desk, where somebody sits there who can be asked, or can answer from elsewhere.
+pub(super) fn person(desk: &Desk, answers_elsewhere: bool) -> Option<Arc<dyn Person>> {
+    (answers_elsewhere || Desk::is_attended()).then(|| Arc::new(desk.clone()) as Arc<dyn Person>)
 }
 
 impl Job {
@@ -254,7 +259,7 @@ impl Job {
             folder: profile
                 .and_then(Path::parent)
                 .map_or_else(PathBuf::new, Path::to_path_buf),
-            person: person(&self.desk),
+            person: person(&self.desk, arguments.people.questions.is_some()),
             vehicles: self.vehicles,
         };
         let mut run = SocketRun::of_profile(&self.effective, &self.library, &self.pack, surroundings, place)?;
@@ -485,6 +490,9 @@ impl Job {
             screen
         };
         let mut followed = Followed::new(screen, self.output.events.as_deref())?;
+        if let Some(follower) = followed.follower() {
+            self.desk.is_followed_by(follower);
+        }
         followed.begun(&About {
             run: &self.request.run,
             role: device.role.word(),
@@ -494,6 +502,16 @@ impl Job {
             bundle: bundle.folder(),
         });
         Ok(followed)
+    }
+}
+
+/// Why questions cannot be answered over HTTP.
+fn not_answering(error: AnsweringError) -> Problem {
+    match error {
+        AnsweringError::Listen { .. } => environment(error),
+        AnsweringError::Address(_) | AnsweringError::NotLocal(_) => {
+            Diagnostic::whole("questions", error.to_string()).into()
+        }
     }
 }
 

@@ -85,9 +85,10 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         }
         Ok(match self.engine.hook(AFTER_START, Map::new(), true).await? {
             HookOutcome::Done(_) | HookOutcome::Missing => Ok(()),
-            HookOutcome::Failed(why) | HookOutcome::Refused(why) | HookOutcome::Skipped(why) => {
-                Err(format!("hook `{AFTER_START}` failed: {why}"))
-            }
+            HookOutcome::Failed(why)
+            | HookOutcome::Refused(why)
+            | HookOutcome::Skipped(why)
+            | HookOutcome::Unanswered(why) => Err(format!("hook `{AFTER_START}` failed: {why}")),
         })
     }
 
@@ -132,7 +133,10 @@ async fn off_and_on<L: Link, O: Operator>(session: &mut Session<'_, L, O>) -> Re
     let before = next_seq(&session.engine.recorder);
     match session.engine.hook("power-cycle", Map::new(), true).await? {
         HookOutcome::Done(_) => {}
-        HookOutcome::Failed(failed) | HookOutcome::Refused(failed) | HookOutcome::Skipped(failed) => {
+        HookOutcome::Failed(failed)
+        | HookOutcome::Refused(failed)
+        | HookOutcome::Skipped(failed)
+        | HookOutcome::Unanswered(failed) => {
             return Ok(Err(format!("hook `power-cycle` failed: {failed}")));
         }
         HookOutcome::Missing => return Ok(Err("there is no hook `power-cycle`".to_owned())),

@@ -6,6 +6,7 @@
 #![warn(missing_docs)]
 
 mod admission;
+mod answering;
 mod between;
 mod bindings;
 mod bundle;
@@ -35,6 +36,7 @@ mod person;
 mod plan;
 mod presence;
 mod program;
+mod questions;
 mod request;
 mod rest;
 mod risk;
@@ -44,8 +46,10 @@ mod setup;
 mod site;
 mod strikes;
 pub mod supervisor;
+mod time_left;
 mod virtual_run;
 
+pub use answering::{Answering, AnsweringError};
 pub use bundle::{Bundle, BundleError, JOURNAL, write_whole};
 pub use capabilities::Capabilities;
 pub use discover::{Device, Heard, Position, listen};
@@ -59,6 +63,7 @@ pub use over_sockets::{Hold, Place, RunError, SocketRun};
 pub use overheard::Overheard;
 pub use person::{Answer, Person, Wanted};
 pub use plan::{How, PlanLine, RunPlan, Use, Waits};
+pub use questions::{Board, Question};
 pub use request::{Request, RequestBuilder, Shard};
 pub use selection::{Criteria, Selection, SelectionError, matches, meant, select};
 pub use session::{ENDS_WITHIN, End, Finished, Progress, Setup, run};

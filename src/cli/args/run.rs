@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::{DeviceArgs, Format, OutputArgs, PipelineArgs, SelectionArgs, SuiteArgs};
+use super::{DeviceArgs, Format, OutputArgs, PeopleArgs, PipelineArgs, SelectionArgs, SuiteArgs};
 use tck_run::Shard;
 
 const RUN_HELP: &str = "\
@@ -46,6 +46,9 @@ pub struct Run {
     /// What a pipeline reads.
     #[command(flatten)]
     pub pipeline: PipelineArgs,
+    /// How people are asked.
+    #[command(flatten)]
+    pub people: PeopleArgs,
     /// Which suites.
     #[command(flatten)]
     pub suites: SuiteArgs,
@@ -202,6 +205,9 @@ pub struct Certify {
     /// What a pipeline reads.
     #[command(flatten)]
     pub pipeline: PipelineArgs,
+    /// How people are asked.
+    #[command(flatten)]
+    pub people: PeopleArgs,
 }
 
 const QUALIFY_HELP: &str = "\
