@@ -155,6 +155,7 @@ impl Tck {
                     command: request.command,
                     fail_fast: request.fail_fast,
                     repeat: request.repeat,
+                    budget: request.budget,
                     certifies: request.certifies,
                     limits: request.limits,
                     begun: WallClock::start().now().utc,

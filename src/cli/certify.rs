@@ -31,7 +31,13 @@ pub fn certify(arguments: &args::Certify, outputs: &Outputs<'_>) -> Result<Exit,
         },
         output: arguments.output.clone(),
         pipeline: arguments.pipeline.clone(),
+        people: arguments.people.clone(),
+        selection: args::SelectionArgs {
+            resume: arguments.resume.clone(),
+            ..args::SelectionArgs::default()
+        },
         thorough: arguments.thorough,
+        budget: arguments.budget,
         certificate: true,
         ..args::Run::default()
     };

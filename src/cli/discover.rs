@@ -14,9 +14,9 @@ use tck_base::diagnostic::Diagnostic;
 use tck_judge::Library;
 use tck_net::bench::endpoint::{Access, Credentials, Endpoint};
 use tck_net::bench::tls::TlsFiles;
-use tck_pack::Packs;
+use tck_pack::{Packs, Role};
 use tck_profile as profile;
-use tck_run::{Device, Heard, Wishes, draft, listen};
+use tck_run::{Device, Heard, Wishes, draft, draft_master_control, listen};
 
 /// `discover`.
 pub fn discover(arguments: &Discover) -> Result<Exit, Problem> {
@@ -55,6 +55,9 @@ pub fn init(arguments: &Init) -> Result<Exit, Problem> {
             .into());
     }
     let library = crate::assets::library(None)?;
+    if arguments.role == Role::MasterControl {
+        return skeleton(arguments, &library);
+    }
     let heard = hear(&arguments.listen, &library)?;
     let is_meant = |device: &&Device| {
         let same = |wanted: &Option<String>, own: &str| wanted.as_deref().is_none_or(|wanted| wanted == own);
@@ -68,16 +71,7 @@ pub fn init(arguments: &Init) -> Result<Exit, Problem> {
         [] => return Err(choose("no device of that name was heard", &all)),
         _ => return Err(choose("several devices were heard", &meant)),
     };
-    let at = &arguments.listen.at.access;
-    let file = |path: &Option<PathBuf>| path.as_ref().map(|path| path.display().to_string());
-    let wishes = Wishes {
-        broker: arguments.listen.at.access.broker.clone(),
-        username: arguments.listen.at.access.username.clone(),
-        tls_ca: file(&at.tls_ca),
-        identity: file(&at.client_cert).zip(file(&at.client_key)),
-        lif: arguments.lif.clone(),
-        vehicle_type: arguments.vehicle_type.clone(),
-    };
+    let wishes = wishes(arguments);
     let text = draft(device, &wishes, &library.rules.packs, &library.rules.hooks);
     let shown = arguments.file.display().to_string();
     std::fs::write(&arguments.file, text)
@@ -123,6 +117,40 @@ fn export(folder: &Path, format: Format) -> Result<Exit, Problem> {
         "{shown}/agv and {shown}/master-control hold the tests, {shown}/monitors the monitors, {shown}/requirements the \
          catalogue, {shown}/schemas the schemas, {shown}/default.toml every setting with its default; \
          `--suites` takes a folder that is laid out like this, with only your own files in it\n"
+    ))
+}
+
+/// What is said on the command line about a profile.
+fn wishes(arguments: &Init) -> Wishes {
+    let at = &arguments.listen.at.access;
+    let file = |path: &Option<PathBuf>| path.as_ref().map(|path| path.display().to_string());
+    Wishes {
+        broker: arguments.listen.at.access.broker.clone(),
+        username: arguments.listen.at.access.username.clone(),
+        tls_ca: file(&at.tls_ca),
+        identity: file(&at.client_cert).zip(file(&at.client_key)),
+        lif: arguments.lif.clone(),
+        vehicle_type: arguments.vehicle_type.clone(),
+    }
+}
+
+/// Writes the skeleton of a profile of a master control.
+fn skeleton(arguments: &Init, library: &Library) -> Result<Exit, Problem> {
+    let named = |name: &Option<String>, made_up: &str| name.clone().unwrap_or_else(|| made_up.to_owned());
+    let manufacturer = named(&arguments.manufacturer, "ACME");
+    let serial = named(&arguments.serial, "fleet-manager");
+    let text = draft_master_control(&manufacturer, &serial, &wishes(arguments), &library.rules.hooks);
+    let shown = arguments.file.display().to_string();
+    std::fs::write(&arguments.file, text)
+        .map_err(|error| Problem::Environment(format!("cannot write {shown}: {error}")))?;
+    if arguments.format == Format::Json {
+        return super::print(&format!(
+            "{:#}\n",
+            json!({ "format": "vda5050-tck.init/1", "file": shown })
+        ));
+    }
+    super::print(&format!(
+        "{shown} is written; next: name its hooks there, and vda5050-tck run --profile {shown} --plan\n"
     ))
 }
 

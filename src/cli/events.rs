@@ -3,13 +3,14 @@
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use serde_json::{Map, Value, json};
 
 use super::problem::Problem;
 use super::screen::Screen;
-use crate::ui::Output;
+use crate::ui::{Follower, Output};
 use tck_engine::Watcher;
 use tck_journal::event::{Gate, Plan};
 use tck_net::link::mqtt::BenchInfo;
@@ -24,14 +25,32 @@ pub const FORMAT: &str = "vda5050-tck.events/1";
 pub struct Followed {
     /// What a person sees.
     pub screen: Screen,
-    stream: Option<Output<Box<dyn Write>>>,
+    stream: Option<Stream>,
     test: String,
+}
+
+/// The stream, which is written to from where a person is asked as well.
+#[derive(Clone)]
+struct Stream(Arc<Mutex<Output<Box<dyn Write + Send>>>>);
+
+impl Stream {
+    fn tell(&self, event: &str, members: Value) {
+        let mut line = Map::new();
+        line.insert("event".to_owned(), event.into());
+        line.insert("at".to_owned(), format!("{:.3}", jiff::Timestamp::now()).into());
+        if let Value::Object(members) = members {
+            line.extend(members.into_iter().filter(|(_, value)| !value.is_null()));
+        }
+        let mut stream = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        // A follower that has gone away, or a full disk, does not end the run: the bundle has it all.
+        let _ = stream.line(&Value::Object(line).to_string());
+    }
 }
 
 impl Followed {
     /// Nobody follows unless a file is given; `-` is standard output.
     pub fn new(screen: Screen, events: Option<&Path>) -> Result<Self, Problem> {
-        let stream: Option<Box<dyn Write>> = match events {
+        let stream: Option<Box<dyn Write + Send>> = match events {
             None => None,
             Some(path) if path.as_os_str() == "-" => Some(Box::new(io::stdout())),
             Some(path) => {
@@ -44,21 +63,26 @@ impl Followed {
         };
         Ok(Self {
             screen,
-            stream: stream.map(Output::to),
+            stream: stream.map(|stream| Stream(Arc::new(Mutex::new(Output::to(stream))))),
             test: String::new(),
         })
     }
 
-    fn tell(&mut self, event: &str, members: Value) {
-        let Some(stream) = &mut self.stream else { return };
-        let mut line = Map::new();
-        line.insert("event".to_owned(), event.into());
-        line.insert("at".to_owned(), format!("{:.3}", jiff::Timestamp::now()).into());
-        if let Value::Object(members) = members {
-            line.extend(members.into_iter().filter(|(_, value)| !value.is_null()));
+    fn tell(&self, event: &str, members: Value) {
+        if let Some(stream) = &self.stream {
+            stream.tell(event, members);
         }
-        // A follower that has gone away, or a full disk, does not end the run: the bundle has it all.
-        let _ = stream.line(&Value::Object(line).to_string());
+    }
+
+    /// Tells of questions to a person, and of their answers.
+    pub fn follower(&self) -> Option<Follower> {
+        let (asked, answered) = (self.stream.clone()?, self.stream.clone()?);
+        Some(Follower {
+            asked: Box::new(move |question| asked.tell("question", json!(question))),
+            answered: Box::new(move |number, answer| {
+                answered.tell("answered", json!({ "number": number, "answer": answer.word() }));
+            }),
+        })
     }
 
     /// The run begins.

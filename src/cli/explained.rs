@@ -63,7 +63,8 @@ fn faults() -> impl Iterator<Item = (Role, &'static Fault)> {
 fn requirement(known: &Requirement, library: &Library, pack: &Pack) -> Value {
     let id = known.id.as_str();
     let versions = known.versions.iter().map(|(version, note)| {
-        let note = json!({ "section": note.section, "mood": note.mood.word() });
+        let link = library.rules.packs.get(version).and_then(|pack| known.link_in(pack));
+        let note = json!({ "section": note.section, "mood": note.mood.word(), "link": link });
         (version.clone(), note)
     });
     let versions: Map<String, Value> = versions.collect();
@@ -79,6 +80,7 @@ fn requirement(known: &Requirement, library: &Library, pack: &Pack) -> Value {
         .collect();
     json!({ "kind": "requirement", "id": id, "chapter": known.chapter, "text": known.text, "role": known.role.word(),
         "versions": versions, "inVersion": known.in_version(pack).is_some(), "interpretation": known.interpretation,
+        "because": known.because, "otherwise": known.otherwise,
         "decided": known.decided.word(), "tests": by, "monitors": monitors, "provedWith": proved })
 }
 

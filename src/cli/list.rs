@@ -383,6 +383,14 @@ fn about_requirement(requirement: &Requirement, library: &Library, pack: &Pack) 
             note.section,
             note.mood.word()
         );
+        if let Some(link) = library
+            .rules
+            .packs
+            .get(version)
+            .and_then(|pack| requirement.link_in(pack))
+        {
+            let _ = writeln!(text, "{:<14} {link}", "");
+        }
     }
     if requirement.in_version(pack).is_none() {
         let _ = writeln!(text, "VDA 5050 {:<5} does not have it", pack.id);
@@ -397,6 +405,12 @@ fn about_requirement(requirement: &Requirement, library: &Library, pack: &Pack) 
     }
     if let Some(ruling) = &requirement.interpretation {
         let _ = writeln!(text, "ruling         {ruling}");
+    }
+    if let Some(because) = &requirement.because {
+        let _ = writeln!(text, "because        {because}");
+    }
+    if let Some(otherwise) = &requirement.otherwise {
+        let _ = writeln!(text, "or else        {otherwise}");
     }
     let _ = writeln!(text, "decided        {}", requirement.decided.word());
     let id = requirement.id.as_str();

@@ -1,6 +1,7 @@
 //! `run --plan`, and what `validate` says about a good profile.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use serde_json::json;
 
@@ -13,7 +14,7 @@ use tck_judge::Library;
 use tck_profile::{Effective, Surroundings};
 use tck_report::advice::advice;
 use tck_report::statement::many;
-use tck_run::{How, Place, RunPlan, SocketRun, Waits};
+use tck_run::{Floor, How, Place, RunError, RunPlan, SocketRun, Waits};
 
 /// How many tests of a reason are named.
 const NAMED: usize = 3;
@@ -35,17 +36,82 @@ pub(super) fn show(plan: &RunPlan, format: Format) -> Result<Exit, Problem> {
 pub(super) fn validated(effective: &Effective, library: &Library) -> Result<String, Vec<Diagnostic>> {
     let pack = tck_run::pack_of(library, effective).map_err(|wrong| vec![wrong])?;
     let surroundings = Surroundings::of_process();
-    let run = SocketRun::of_profile(effective, library, &pack, &surroundings, Place::default())?;
+    let mut run = SocketRun::of_profile(effective, library, &pack, &surroundings, Place::default())?;
+    let wrong = |error: RunError| vec![effective.complain("bench.broker", "broker", error.to_string(), "this one")];
+    run.overhear(&pack).map_err(wrong)?;
     let layout = run.device.layout.as_ref().map_or("no layout".to_owned(), |layout| {
         format!("layout with {}", many(layout.nodes().count(), "node"))
     });
     let plan = run.plan(library, &pack);
-    Ok(format!(
+    let mut text = format!(
         "valid profile: {}, VDA 5050 {}; {layout}; {}",
         escaped(&plan.device),
         plan.protocol,
         numbers(&plan).join(", ")
-    ))
+    );
+    if let Some(known_from) = &plan.known_from {
+        let _ = write!(text, "; {}", escaped(known_from));
+    }
+    for sentence in plan.floor.iter().flat_map(|floor| &floor.left_out) {
+        let _ = write!(text, "\n  not used: {}", escaped(sentence));
+    }
+    Ok(text)
+}
+
+/// Draws the floor of a plan into a file.
+pub(super) fn draw(plan: &RunPlan, file: &Path) -> Result<(), Problem> {
+    let Some(floor) = &plan.floor else {
+        let title = "there is no floor that could be drawn";
+        return Err(Diagnostic::whole("floor", title)
+            .hint("name it in the section [layout] of the profile")
+            .into());
+    };
+    std::fs::write(file, &floor.svg)
+        .map_err(|error| Problem::Environment(format!("cannot write {}: {error}", file.display())))
+}
+
+/// What of the floor is not used, and which tests want more of it, with the floor itself.
+fn floor(floor: &Floor) -> String {
+    let mut text = String::new();
+    for sentence in &floor.left_out {
+        let _ = writeln!(text, "         not used: {}", escaped(sentence));
+    }
+    if floor.wanting.is_empty() {
+        return text;
+    }
+    let _ = writeln!(
+        text,
+        "\nThe floor: {} and {}",
+        many(floor.nodes, "node"),
+        many(floor.edges, "edge")
+    );
+    for line in floor.text.lines() {
+        let _ = writeln!(text, "  {}", escaped(line));
+    }
+    let _ = writeln!(text, "\nTests that want more floor:");
+    for one in &floor.wanting {
+        let from = match one.from {
+            0 => "from no place".to_owned(),
+            from => format!("only from {from} of {}", many(one.of, "place")),
+        };
+        let _ = writeln!(
+            text,
+            "{:>11}  {from}: {}\n             {}",
+            many(one.tests.len(), "test"),
+            escaped(&one.why),
+            first_of(&one.tests)
+        );
+    }
+    text
+}
+
+/// The first tests by name, and how many more there are.
+fn first_of(tests: &[impl AsRef<str>]) -> String {
+    let named: Vec<&str> = tests.iter().take(NAMED).map(AsRef::as_ref).collect();
+    match tests.len().saturating_sub(NAMED) {
+        0 => named.join(", "),
+        more => format!("{} and {more} more", named.join(", ")),
+    }
 }
 
 /// Refuses a run that would leave tests undecided for what the profile does not say or the bench does not have.
@@ -60,17 +126,12 @@ pub(super) fn complete(plan: &RunPlan) -> Result<(), Problem> {
         many(count, "test")
     );
     for (why, tests) in lacking {
-        let named: Vec<&str> = tests.iter().take(NAMED).copied().collect();
-        let more = match tests.len().saturating_sub(NAMED) {
-            0 => String::new(),
-            more => format!(" and {more} more"),
-        };
         let _ = write!(
             title,
-            "\n{:>11}  {}\n             {}{more}",
+            "\n{:>11}  {}\n             {}",
             many(tests.len(), "test"),
             escaped(&advice(why)),
-            named.join(", ")
+            first_of(&tests)
         );
     }
     let hint = "say of what the device does not have that it has not (`claims`, in the section [device]), or use `run`";
@@ -172,6 +233,10 @@ fn text(plan: &RunPlan) -> String {
             let _ = writeln!(text, "         {}", escaped(topic));
         }
     }
+    if let Some(known_from) = &plan.known_from {
+        let _ = writeln!(text, "known    {}", escaped(known_from));
+    }
+    text.extend(plan.floor.iter().map(floor));
     let sections = [
         (Waits::Inconclusive, "To decide more:"),
         (Waits::DependsOnDevice, "Known when the device is there:"),
@@ -190,12 +255,7 @@ fn text(plan: &RunPlan) -> String {
                 why.to_string()
             };
             let _ = writeln!(text, "{:>11}  {}", many(tests.len(), "test"), escaped(&what));
-            let named: Vec<&str> = tests.iter().take(NAMED).copied().collect();
-            let more = match tests.len().saturating_sub(NAMED) {
-                0 => String::new(),
-                more => format!(" and {more} more"),
-            };
-            let _ = writeln!(text, "             {}{more}", named.join(", "));
+            let _ = writeln!(text, "             {}", first_of(&tests));
         }
     }
     text

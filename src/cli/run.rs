@@ -4,7 +4,6 @@ mod conclude;
 mod resume;
 
 use std::collections::BTreeMap;
-use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -39,8 +38,8 @@ use tck_pack::{Pack, Role};
 use tck_profile::{self as profile, Effective, Surroundings};
 use tck_report::statement::many;
 use tck_run::{
-    Bundle, Criteria, Hold, LATEST, Person, Place, Request, RequestBuilder, RunError, RunPlan, SocketRun, VirtualRun,
-    going_on_at, pack_of, run_virtually, write_result,
+    Answering, AnsweringError, Bundle, Criteria, Hold, LATEST, Person, Place, Request, RequestBuilder, RunError,
+    RunPlan, SocketRun, VirtualRun, going_on_at, pack_of, run_virtually, write_result,
 };
 use tck_simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
 
@@ -117,7 +116,8 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
         return job.plan(arguments, built_in, &surroundings);
     }
     if job.certifies && !built_in {
-        let plan = job.of_profile(arguments, &surroundings)?;
+        let mut plan = job.of_profile(arguments, &surroundings)?;
+        plan.overhear(&job.pack).map_err(|error| job.could_not_begin(error))?;
         super::plan::complete(&job.planned(plan))?;
     }
     let runtime = tokio::runtime::Builder::new_multi_thread()
@@ -132,6 +132,13 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
         job.desk = ending.desk.clone();
         job.quit = Some(ending.quit);
         desk = job.desk.clone();
+        let answering = match &arguments.people.questions {
+            Some(listen) => Some(Answering::start(listen, desk.board()).await.map_err(not_answering)?),
+            None => None,
+        };
+        if let Some(answering) = &answering {
+            eprintln!("questions are answered at {} (docs/events.md)", answering.url());
+        }
         if arguments.in_virtual_time {
             job.virtually(arguments, interrupt, outputs).await
         } else if built_in {
@@ -179,6 +186,9 @@ fn asked(arguments: &args::Run, earlier: Option<&Earlier>) -> RequestBuilder {
     if arguments.certifies {
         asked = asked.certifies();
     }
+    if let Some(budget) = arguments.budget {
+        asked = asked.budget(budget);
+    }
     if wanted.fail_fast {
         asked = asked.fail_fast();
     }
@@ -195,10 +205,9 @@ pub(super) fn hold(desk: &Desk) -> Hold {
     }
 }
 
-/// The desk, where somebody sits there who can be asked.
-pub(super) fn person(desk: &Desk) -> Option<Arc<dyn Person>> {
-    let attended = std::io::stdin().is_terminal() && std::io::stderr().is_terminal();
-    attended.then(|| Arc::new(desk.clone()) as Arc<dyn Person>)
+/// The desk, where somebody sits there who can be asked, or can answer from elsewhere.
+pub(super) fn person(desk: &Desk, answers_elsewhere: bool) -> Option<Arc<dyn Person>> {
+    (answers_elsewhere || Desk::is_attended()).then(|| Arc::new(desk.clone()) as Arc<dyn Person>)
 }
 
 impl Job {
@@ -231,7 +240,12 @@ impl Job {
         if self.no_motion {
             run.device.stand_still(Reason::MotionRuledOut);
         }
-        super::plan::show(&self.planned(run), self.output.format)
+        run.overhear(&self.pack).map_err(|error| self.could_not_begin(error))?;
+        let plan = self.planned(run);
+        if let Some(file) = &arguments.selection.floor {
+            super::plan::draw(&plan, file)?;
+        }
+        super::plan::show(&plan, self.output.format)
     }
 
     fn planned(&self, mut run: SocketRun) -> RunPlan {
@@ -246,7 +260,7 @@ impl Job {
             folder: profile
                 .and_then(Path::parent)
                 .map_or_else(PathBuf::new, Path::to_path_buf),
-            person: person(&self.desk),
+            person: person(&self.desk, arguments.people.questions.is_some()),
             vehicles: self.vehicles,
         };
         let mut run = SocketRun::of_profile(&self.effective, &self.library, &self.pack, surroundings, place)?;
@@ -266,6 +280,7 @@ impl Job {
         self.is_resumable(&AboutRun {
             subject: device.subject(),
             vantage: Vantage::Tap.word(),
+            mode: mode(self.certifies),
             settings: &settings,
             files: &BTreeMap::new(),
         })?;
@@ -283,6 +298,7 @@ impl Job {
         run.command.clone_from(&self.request.command);
         run.fail_fast = self.request.fail_fast;
         run.repeat = self.request.repeat;
+        run.budget = self.request.budget;
         run.limits.clone_from(&self.request.limits);
         run.settings = settings;
         run.earlier = self.earlier.as_ref().map(|earlier| earlier.journal.clone());
@@ -375,6 +391,7 @@ impl Job {
             let about = AboutRun {
                 subject: &run.device.subject,
                 vantage: vantage.word(),
+                mode: mode(self.certifies),
                 settings: &run.device.settings,
                 files: &run.device.files,
             };
@@ -474,6 +491,9 @@ impl Job {
             screen
         };
         let mut followed = Followed::new(screen, self.output.events.as_deref())?;
+        if let Some(follower) = followed.follower() {
+            self.desk.is_followed_by(follower);
+        }
         followed.begun(&About {
             run: &self.request.run,
             role: device.role.word(),
@@ -484,6 +504,21 @@ impl Job {
         });
         Ok(followed)
     }
+}
+
+/// Why questions cannot be answered over HTTP.
+fn not_answering(error: AnsweringError) -> Problem {
+    match error {
+        AnsweringError::Listen { .. } => environment(error),
+        AnsweringError::Address(_) | AnsweringError::NotLocal(_) => {
+            Diagnostic::whole("questions", error.to_string()).into()
+        }
+    }
+}
+
+/// Which command a run is of, as its header says.
+fn mode(certifies: bool) -> Option<&'static str> {
+    certifies.then_some(tck_result::CERTIFY)
 }
 
 /// A complaint with the line of the profile as it may be read by anybody: an address may hold a token.

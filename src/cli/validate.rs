@@ -10,6 +10,7 @@ use super::args::{Format, Validate};
 use super::exit::Exit;
 use super::messages::{self, Counted};
 use super::problem::Problem;
+use crate::ui::escaped;
 use tck_base::diagnostic::{Diagnostic, Source};
 use tck_course::Layout;
 use tck_explore::Grammar;
@@ -242,10 +243,13 @@ fn one(name: &str, bytes: &[u8], arguments: &Validate, library: &Library) -> Res
 /// Reads a layout for each of its vehicle types: which one is meant is said by the profile that uses it.
 fn layout(source: &Arc<Source>) -> Result<String, Vec<Diagnostic>> {
     let mut said = Vec::new();
+    let mut left_out = Vec::new();
     for vehicle_type in Layout::vehicle_types(source)? {
         let layout = Layout::from_lif(source, Some(&vehicle_type))?;
         let (nodes, edges) = (layout.nodes().count(), layout.edges().count());
         said.push(format!("{nodes} nodes and {edges} edges for {vehicle_type}"));
+        let unused = layout.left_out().iter();
+        left_out.extend(unused.map(|sentence| format!("\n  not used for {vehicle_type}: {}", escaped(sentence))));
     }
-    Ok(format!("a layout with {}", said.join(", ")))
+    Ok(format!("a layout with {}{}", said.join(", "), left_out.concat()))
 }

@@ -20,6 +20,6 @@ pub use hook::hook;
 pub use listing::{faults, hooks, tolerances, vehicle_words};
 pub use output::{Output, escaped};
 pub use progress::{Progress, RunTitle, TestLine};
-pub use prompt::{Desk, put_terminal_back};
+pub use prompt::{Desk, Follower, put_terminal_back};
 pub use terminal::{Terminal, TerminalOptions};
 pub use watching::{LineOptions, Lines};

@@ -2,8 +2,7 @@
 //! are pressed after the question count.
 
 use std::fmt::Write as _;
-use std::io::{self, Write};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::io::{self, IsTerminal as _, Write};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -14,7 +13,7 @@ use tokio::sync::watch;
 
 use super::keyboard::typed;
 use super::output::escaped;
-use tck_run::{Answer, Person, Wanted};
+use tck_run::{Answer, Board, Person, Question, Wanted};
 
 /// How long the keyboard is read before it is looked whether the answer is still wanted.
 const GLANCE: Duration = Duration::from_millis(50);
@@ -31,9 +30,26 @@ struct Shared {
     stop: watch::Sender<bool>,
     /// What is drawn otherwise, and what the run is about now.
     about: Mutex<About>,
-    asked: AtomicUsize,
+    /// The open question, for answers from elsewhere.
+    board: Board,
+    /// Who else hears of questions.
+    follower: Mutex<Option<Follower>>,
     /// Whoever holds it has the terminal to himself.
     terminal: Mutex<()>,
+}
+
+/// Hears of questions and of their answers.
+pub struct Follower {
+    /// A question is asked.
+    pub asked: Box<dyn Fn(&Question) + Send>,
+    /// The question of this number is answered so.
+    pub answered: Box<dyn Fn(u64, &Answer) + Send>,
+}
+
+impl std::fmt::Debug for Follower {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Follower")
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -56,10 +72,28 @@ impl Desk {
             shared: Arc::new(Shared {
                 stop,
                 about: Mutex::new(about),
-                asked: AtomicUsize::new(0),
+                board: Board::default(),
+                follower: Mutex::new(None),
                 terminal: Mutex::new(()),
             }),
         }
+    }
+
+    /// Where the open question stands, and an answer to it can be left.
+    #[must_use]
+    pub fn board(&self) -> Board {
+        self.shared.board.clone()
+    }
+
+    /// Who hears of questions from now on.
+    pub fn is_followed_by(&self, follower: Follower) {
+        *held(&self.shared.follower) = Some(follower);
+    }
+
+    /// Whether somebody sits at the terminal.
+    #[must_use]
+    pub fn is_attended() -> bool {
+        io::stdin().is_terminal() && io::stderr().is_terminal()
     }
 
     /// What is hidden while a person is asked.
@@ -104,8 +138,7 @@ impl Desk {
         drop(held(&self.shared.terminal));
     }
 
-    fn heading(&self, about: &About, what: &str) -> String {
-        let number = self.shared.asked.fetch_add(1, Ordering::Relaxed) + 1;
+    fn heading(number: u64, about: &About, what: &str) -> String {
         let test = about
             .test
             .as_deref()
@@ -141,12 +174,28 @@ impl Person for Desk {
                 );
                 return Answer::GivenUp;
             }
-            let heading = self.heading(&about, what);
-            let answer = match Raw::on() {
-                Ok(_raw) => put(&heading, within, wanted, &self.shared.stop, &mut terminal),
-                Err(error) => Err(error),
+            let place = (about.test.clone(), about.step.clone());
+            let number = self.shared.board.put_up(place, what, within);
+            if let (Some(follower), Some(question)) = (&*held(&self.shared.follower), self.shared.board.question()) {
+                (follower.asked)(&question);
+            }
+            let heading = Self::heading(number, &about, what);
+            let asked = Asked {
+                within,
+                wanted,
+                stop: &self.shared.stop,
+                board: &self.shared.board,
             };
+            let answer = if Self::is_attended() {
+                Raw::on().and_then(|_raw| asked.put(&heading, &mut terminal))
+            } else {
+                asked.wait(&heading, &mut terminal)
+            };
+            self.shared.board.take_down();
             let answer = answer.unwrap_or_else(|error| Answer::Unasked(error.to_string()));
+            if let Some(follower) = &*held(&self.shared.follower) {
+                (follower.answered)(number, &answer);
+            }
             if answer == Answer::End {
                 self.shared.stop.send_replace(true);
             }
@@ -180,40 +229,68 @@ pub fn put_terminal_back() {
     let _ = disable_raw_mode();
 }
 
-fn put(
-    heading: &str,
+/// A question, and what may end the wait for its answer.
+struct Asked<'a> {
     within: Duration,
-    wanted: &Wanted,
-    stop: &watch::Sender<bool>,
-    terminal: &mut impl Write,
-) -> io::Result<Answer> {
-    // What was typed before the question is no answer to it.
-    while typed(Duration::ZERO)?.is_some() {}
-    write!(terminal, "\x07{heading}")?;
-    let until = Instant::now() + within;
-    let mut shown = None;
-    let answer = loop {
-        let left = until.saturating_duration_since(Instant::now());
-        if shown != Some(left.as_secs()) {
-            shown = Some(left.as_secs());
-            write!(terminal, "\r\x1b[2K{}", keys(left))?;
-            terminal.flush()?;
+    wanted: &'a Wanted,
+    stop: &'a watch::Sender<bool>,
+    board: &'a Board,
+}
+
+impl Asked<'_> {
+    /// The answer, as far as it does not come from the keyboard; `None` as long as there is none.
+    fn otherwise(&self, left: Duration) -> Option<Answer> {
+        if let Some(given) = self.board.given() {
+            return Some(given);
         }
         if left.is_zero() {
-            break Answer::Silence;
+            return Some(Answer::Silence);
         }
-        if wanted.is_given_up() || *stop.borrow() {
-            break Answer::GivenUp;
-        }
-        if let Some(Event::Key(key)) = typed(GLANCE.min(left))?
-            && let Some(answer) = meaning(key)
-        {
-            break answer;
-        }
-    };
-    write!(terminal, "\r\x1b[2K   {}\r\n", said(&answer))?;
-    terminal.flush()?;
-    Ok(answer)
+        (self.wanted.is_given_up() || *self.stop.borrow()).then_some(Answer::GivenUp)
+    }
+
+    /// Asks at the terminal.
+    fn put(&self, heading: &str, terminal: &mut impl Write) -> io::Result<Answer> {
+        // What was typed before the question is no answer to it.
+        while typed(Duration::ZERO)?.is_some() {}
+        write!(terminal, "\x07{heading}")?;
+        let until = Instant::now() + self.within;
+        let mut shown = None;
+        let answer = loop {
+            let left = until.saturating_duration_since(Instant::now());
+            if shown != Some(left.as_secs()) {
+                shown = Some(left.as_secs());
+                write!(terminal, "\r\x1b[2K{}", keys(left))?;
+                terminal.flush()?;
+            }
+            if let Some(answer) = self.otherwise(left) {
+                break answer;
+            }
+            if let Some(Event::Key(key)) = typed(GLANCE.min(left))?
+                && let Some(answer) = meaning(key)
+            {
+                break answer;
+            }
+        };
+        write!(terminal, "\r\x1b[2K   {}\r\n", said(&answer))?;
+        terminal.flush()?;
+        Ok(answer)
+    }
+
+    /// Says what is asked, and waits for an answer from elsewhere.
+    fn wait(&self, heading: &str, terminal: &mut impl Write) -> io::Result<Answer> {
+        write!(terminal, "{}", heading.replace('\r', ""))?;
+        let until = Instant::now() + self.within;
+        let answer = loop {
+            let left = until.saturating_duration_since(Instant::now());
+            if let Some(answer) = self.otherwise(left) {
+                break answer;
+            }
+            std::thread::sleep(GLANCE.min(left));
+        };
+        writeln!(terminal, "   {}", said(&answer))?;
+        Ok(answer)
+    }
 }
 
 fn keys(left: Duration) -> String {
@@ -285,13 +362,13 @@ mod tests {
         desk.runs("state/emergency-stop");
         desk.performs(Some("The operator stops it"));
         let about = held(&desk.shared.about).clone();
-        let heading = desk.heading(&about, "Press an emergency stop.\u{1b}[2J");
+        let heading = Desk::heading(1, &about, "Press an emergency stop.\u{1b}[2J");
         assert_eq!(
             console::strip_ansi_codes(&heading),
             "\r\n-- question 1, test state/emergency-stop --\r\n   The operator stops it\r\n   Press an emergency \
              stop.\\u{1b}[2J\r\n"
         );
-        assert!(desk.heading(&about, "Release it.").contains("question 2"));
+        assert!(Desk::heading(2, &about, "Release it.").contains("question 2"));
         assert!(keys(Duration::from_secs(598)).ends_with("9:58 left "));
     }
 

@@ -13,7 +13,7 @@ fn root() -> &'static Path {
 }
 
 /// The lines of a stream, each held against the schema.
-fn events(text: &str) -> Vec<Value> {
+pub fn events(text: &str) -> Vec<Value> {
     let schema = fs::read_to_string(root().join("schemas/events.schema.json")).unwrap();
     let schema: Value = serde_json::from_str(&schema).unwrap();
     let validator = jsonschema::validator_for(&schema).unwrap();

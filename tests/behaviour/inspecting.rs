@@ -212,6 +212,19 @@ fn a_requirement_is_explained_with_what_decides_it() {
 }
 
 #[test]
+fn a_ruling_is_explained_with_its_reason_the_other_reading_and_the_place_in_the_text() {
+    run(&["explain", "ORD-REJ-01"])
+        .code(0)
+        .prints("https://github.com/VDA5050/VDA5050/blob/2.1.0/VDA5050_EN.md#6641-vehicle-gets-a-malformed-new-order")
+        .prints("because ")
+        .prints("or else ");
+    let told = run(&["explain", "ORD-REJ-01", "--format", "json"]).code(0).stdout;
+    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
+    assert!(told["versions"]["2.1"]["link"].as_str().unwrap().contains("#6641-"));
+    assert!(told["because"].is_string() && told["otherwise"].is_string());
+}
+
+#[test]
 fn everything_that_has_a_name_is_explained() {
     for (name, what) in [
         ("order-rejection/lower-update-id", "decides"),

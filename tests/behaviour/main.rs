@@ -27,6 +27,7 @@ mod papers;
 mod pipelines;
 mod planning;
 mod prompting;
+mod questions;
 mod rejudging;
 mod repeatable;
 mod resuming;

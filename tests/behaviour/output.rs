@@ -112,3 +112,59 @@ fn nobody_who_reads_at_all_is_no_failure_either() {
     assert_eq!(child.wait().unwrap().code(), Some(0));
     bench.is_whole();
 }
+
+#[test]
+fn a_failure_shows_what_was_sent_in_plain_words() {
+    let bench = Bench::new();
+    let wrong = "order-rejection/malformed[update-id-of-wrong-type]";
+    let ended = bench
+        .run(&["run", "--virtual", wrong, "--fault", "rejection-silent"])
+        .code(1)
+        .prints("orderUpdateId \"first\" (a text)")
+        .prints("a new error");
+    // The clause of the suite is quoted as it is written.
+    let is_quoted = |line: &&str| {
+        line.trim_start()
+            .trim_start_matches(|c: char| c.is_ascii_digit())
+            .starts_with(" |")
+    };
+    for line in ended.stdout.lines().filter(|line| !is_quoted(line)) {
+        assert!(!line.contains('$') && !line.contains("{}"), "{line}");
+    }
+    let result = bench.result();
+    let decisions = result["tests"][0]["decisions"].as_array().unwrap();
+    let broken: Vec<&Value> = decisions.iter().filter(|one| one["verdict"] == "fail").collect();
+    assert!(!broken.is_empty());
+    for decision in broken {
+        let sent = &decision["sent"];
+        assert_eq!(sent["topic"], "order");
+        assert_eq!(sent["members"][0]["path"], "orderUpdateId");
+        assert_eq!(sent["members"][0]["value"], "\"first\" (a text)");
+        let seq = sent["seq"].as_u64().unwrap();
+        let line = bench
+            .journal()
+            .lines()
+            .nth(usize::try_from(seq).unwrap() - 1)
+            .unwrap()
+            .to_owned();
+        assert!(line.contains("\"kind\":\"sent\"") && line.contains("first"), "{line}");
+    }
+    let page = std::fs::read_to_string(bench.bundle().join("report.html")).unwrap();
+    assert!(page.contains("Sent before") && page.contains("<code>orderUpdateId</code>"));
+    bench.is_whole();
+}
+
+#[test]
+fn a_member_that_is_left_out_and_bytes_that_are_no_message_are_shown_too() {
+    let bench = Bench::new();
+    let silent = ["--fault", "rejection-silent"];
+    let missing = "order-rejection/malformed[node-id-missing]";
+    bench
+        .run(&[&["run", "--virtual", missing], &silent[..]].concat())
+        .code(1)
+        .prints("nodes[0].nodeId left out");
+    bench
+        .run(&[&["run", "--virtual", crate::bench::REFUSAL], &silent[..]].concat())
+        .code(1)
+        .prints("order: the bytes \"");
+}

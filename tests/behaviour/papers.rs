@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::Path;
+use std::time::Duration;
 
 use serde_json::Value;
 use vda5050_tck::pack::Role;
@@ -14,6 +15,11 @@ use crate::tool::{Running, tool};
 
 /// A bundle as `certify` leaves it, of a few tests.
 pub fn certified(folder: &Path) {
+    certified_within(folder, None);
+}
+
+/// A bundle as `certify --budget` leaves it.
+pub fn certified_within(folder: &Path, budget: Option<Duration>) {
     fs::create_dir(folder).unwrap();
     let library = vda5050_tck::library(None).unwrap_or_else(|all| panic!("{}", all[0]));
     let pack = library.rules.packs.latest().clone();
@@ -21,6 +27,7 @@ pub fn certified(folder: &Path) {
     let tests = library.tests(Role::Agv, &pack.id).into_iter();
     request.tests = Selection::all(tests.filter(|test| test.id.starts_with("order-update/")).collect());
     request.certifies = true;
+    request.budget = budget;
     request.settings = [
         ("laboratory", "Test house"),
         ("tester", "A. Person"),
@@ -125,6 +132,10 @@ fn a_failed_run_is_printed_for_every_pipeline() {
     assert_eq!(quality[0]["severity"], "major");
     let sarif: Value = serde_json::from_str(&printed("sarif")).unwrap();
     let found = &sarif["runs"][0]["results"][0];
+    let help = sarif["runs"][0]["tool"]["driver"]["rules"][0]["helpUri"]
+        .as_str()
+        .unwrap();
+    assert!(help.starts_with("https://github.com/VDA5050/VDA5050/blob/"), "{help}");
     assert_eq!(
         (&found["ruleId"], &found["level"]),
         (&Value::from("ORD-REJ-02"), &Value::from("error"))

@@ -3,6 +3,8 @@
 use serde_json::Value;
 
 use crate::bench::{Bench, Profile, QUICK, REFUSAL};
+use crate::mosquitto::Mosquitto;
+use crate::simulating::retained;
 use crate::tool::{run, run_in};
 
 /// Writes the profile, and runs the program in its folder.
@@ -112,6 +114,69 @@ fn validate_gives_the_numbers_of_the_plan_and_refuses_what_a_run_refuses() {
         bench.run(&["validate", "wrong.toml"]).code(2).prints(what);
         bench.run(&["run", "--profile", "wrong.toml"]).code(2).says(what);
     }
+}
+
+#[test]
+fn what_the_broker_keeps_of_a_vehicle_is_known_before_a_run() {
+    let Some(mosquitto) = Mosquitto::start() else { return };
+    let bench = Bench::new();
+    let _vehicle = bench.agv(mosquitto.port, &[]);
+    retained(mosquitto.port, "ONLINE");
+    let profile = Profile {
+        bench: format!("broker = \"{}\"\ntap = false", mosquitto.url()),
+        ..driving()
+    };
+    let known = plan(&[], &profile);
+    assert_eq!(count(&known, "depends-on-device"), 0);
+    assert!(
+        known["knownFrom"]
+            .as_str()
+            .unwrap()
+            .starts_with("the factsheet that the broker keeps")
+    );
+    let (_bench, said) = with_profile(&profile, &["validate", "device.toml"]);
+    said.code(0).prints("the factsheet that the broker keeps");
+    drop(mosquitto);
+    let (_bench, unknown) = with_profile(&profile, &["run", "--profile", "device.toml", "--plan"]);
+    unknown
+        .code(0)
+        .prints("nobody has looked whether the broker keeps a factsheet");
+}
+
+#[test]
+fn the_floor_is_drawn_with_what_is_not_used_and_who_wants_more_of_it() {
+    let bench = Bench::new();
+    std::fs::write(bench.path().join("device.toml"), driving().text()).unwrap();
+    bench
+        .run(&["run", "--profile", "device.toml", "--plan", "--floor", "floor.svg"])
+        .code(0)
+        .prints("The floor: 4 nodes and 6 edges")
+        .prints("Tests that want more floor:");
+    let svg = std::fs::read_to_string(bench.path().join("floor.svg")).unwrap();
+    assert!(svg.starts_with("<svg") && svg.contains(">A4<"), "{svg}");
+    let hall = format!("{}/fixtures/layouts/hall.lif.json", env!("CARGO_MANIFEST_DIR"));
+    run(&["validate", &hall]).code(0).prints("leads to another map");
+}
+
+#[test]
+fn a_skeleton_for_a_master_control_leads_to_a_plan() {
+    let bench = Bench::new();
+    bench
+        .run(&[
+            "init",
+            "--role",
+            "master-control",
+            "--manufacturer",
+            "ACME",
+            "--serial",
+            "fleet-1",
+        ])
+        .code(0)
+        .prints("device.toml is written");
+    bench
+        .run(&["validate", "device.toml"])
+        .code(0)
+        .prints("valid profile: ACME fleet-1");
 }
 
 #[test]

@@ -1,11 +1,13 @@
 //! Tests that are run several times, runs that go on where another one broke off, and journals that are packed.
 
 use std::fs;
+use std::time::Duration;
 
 use serde_json::Value;
 
 use crate::bench::{Bench, Profile, QUICK, REFUSAL, bundles};
 use crate::broken::step_begun;
+use crate::papers::certified_within;
 
 /// Leaves the vehicle with an order until its postamble.
 const WAITING: &str = "order-acceptance/horizon-not-entered";
@@ -165,6 +167,87 @@ fn an_interrupted_run_is_gone_on_with_against_the_same_device_and_no_other() {
         .run(&["run", "--profile", "device.toml", "--resume", &folder])
         .code(4)
         .says("came to its end");
+}
+
+#[test]
+fn what_does_not_fit_into_the_budget_is_left_out_by_name_and_gone_on_with() {
+    let bench = Bench::new();
+    let drives = "order-update";
+    let plain = |more: &[&str]| bench.run(&[&["run", "--virtual", "--seed", "3"], more].concat());
+    plain(&[QUICK, drives]).code(0);
+    let whole = bench.result();
+    let all = verdicts(&whole).len();
+    fs::remove_dir_all(bench.path().join("reports")).unwrap();
+    plain(&[QUICK, drives, "--budget", "20s"])
+        .code(3)
+        .prints("give the run more time (--budget), or go on with what is left (--resume)");
+    let result = bench.result();
+    assert_eq!(result["partial"], false);
+    let left: Vec<&Value> = result["tests"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|test| test["cause"]["kind"] == "over-budget")
+        .collect();
+    assert!(!left.is_empty() && left.len() < all, "{} of {all}", left.len());
+    for test in &left {
+        assert_eq!(test["verdict"], "inconclusive");
+        assert_eq!(test["reason"], "not carried out: budget (--budget 20s)");
+        assert_eq!(test["cause"]["budget"], 20);
+    }
+    let limits = result["limits"].to_string();
+    assert!(
+        limits.contains(&format!("Of the selected tests {} had no time (--budget)", left.len())),
+        "{limits}"
+    );
+    fs::rename(bench.bundle(), bench.path().join("first")).unwrap();
+    bench
+        .run(&["run", "--virtual", "--seed", "3", "--resume", "first"])
+        .code(0)
+        .prints("Joined from 2 runs");
+    let result = bench.result();
+    assert_eq!(verdicts(&result).len(), all);
+    assert!(
+        verdicts(&result).iter().all(|(_, verdict)| *verdict == "pass"),
+        "{result}"
+    );
+    bench.is_whole();
+}
+
+#[test]
+fn a_repetition_that_has_no_time_is_undecided() {
+    let bench = Bench::new();
+    bench
+        .run(&["run", "--virtual", WAITING, "--repeat", "50", "--budget", "10s"])
+        .code(3)
+        .prints("give the run more time (--budget)");
+    let why = bench.result()["tests"][0]["reason"].as_str().unwrap().to_owned();
+    assert!(
+        why.ends_with("of 50 times: not carried out: budget (--budget 10s)"),
+        "{why}"
+    );
+    bench.is_whole();
+}
+
+#[test]
+fn a_certification_without_time_is_no_paper_and_goes_on_as_a_certification_only() {
+    let bench = Bench::new();
+    certified_within(&bench.path().join("run"), Some(Duration::from_secs(60)));
+    let result = fs::read_to_string(bench.path().join("run/result.json")).unwrap();
+    let result: Value = serde_json::from_str(&result).unwrap();
+    let decided = verdicts(&result)
+        .iter()
+        .filter(|(_, verdict)| *verdict == "pass")
+        .count();
+    assert!(decided > 0 && decided < verdicts(&result).len(), "{decided}");
+    bench
+        .run(&["report", "--certificate", "run"])
+        .code(2)
+        .says("`certify --resume` goes on with it");
+    bench
+        .run(&["run", "--virtual", "--resume", "run"])
+        .code(2)
+        .says("it was made by `certify`, and this is `run`");
 }
 
 #[test]

@@ -8,6 +8,7 @@ mod html;
 mod json;
 mod junit;
 mod junit_schema;
+mod narrow;
 mod picture;
 mod samples;
 mod side_by_side;

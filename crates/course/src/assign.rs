@@ -179,7 +179,10 @@ fn unsatisfiable(need: &CourseNeed, nodes: usize, start: &Node) -> CourseError {
     CourseError::Unsatisfiable {
         nodes,
         start: start.id.clone(),
-        edges: edges.join(", "),
+        edges: match edges[..] {
+            [] => String::new(),
+            _ => format!(" ({})", edges.join(", ")),
+        },
     }
 }
 

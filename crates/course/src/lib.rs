@@ -8,6 +8,7 @@
 
 mod assign;
 mod curve;
+mod drawing;
 mod graph;
 mod layout;
 mod lif;
@@ -138,13 +139,13 @@ pub enum CourseError {
         nearest: String,
     },
     /// The layout cannot give what the test asks.
-    #[error("no {nodes} nodes of the layout from {start:?} on are joined as the test asks ({edges})")]
+    #[error("no {nodes} nodes of the layout from {start:?} on are joined as the test asks{edges}")]
     Unsatisfiable {
         /// How many nodes are asked for.
         nodes: usize,
         /// Where the vehicle stands.
         start: String,
-        /// The edges that are asked for.
+        /// The edges that are asked for, in brackets behind a space; nothing where any will do.
         edges: String,
     },
     /// A station of the profile cannot be used.
@@ -166,6 +167,16 @@ pub enum CourseError {
     /// No node is as far away as the test asks.
     #[error("no node of the layout is {steps} edges away from {start:?}, where the vehicle stands")]
     TooNear {
+        /// Where the vehicle stands.
+        start: String,
+        /// How many edges are asked for.
+        steps: usize,
+    },
+    /// A node is as far away, and no way leads back from it.
+    #[error(
+        "from no node of the layout that is {steps} edges away from {start:?} a way leads back there; add the edges back"
+    )]
+    NoWayBack {
         /// Where the vehicle stands.
         start: String,
         /// How many edges are asked for.

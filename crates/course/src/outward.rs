@@ -20,9 +20,12 @@ impl Layout {
         let stops = self.stops(need, &graph)?;
         let letters = need.nodes.iter().filter(|name| *name != FAR && !is_station(name));
         let steps = letters.filter_map(|name| place_of(name)).max().unwrap_or(0);
-        let path = path(&graph, steps).ok_or_else(|| CourseError::TooNear {
-            start: start.id.clone(),
-            steps,
+        let path = path(&graph, steps, true).ok_or_else(|| {
+            let start = start.id.clone();
+            match path(&graph, steps, false) {
+                Some(_) => CourseError::NoWayBack { start, steps },
+                None => CourseError::TooNear { start, steps },
+            }
         })?;
         let mut course = Course::default();
         course.nodes.insert(HERE.to_owned(), graph.nodes[0].clone());
@@ -44,14 +47,15 @@ impl Layout {
     }
 }
 
-/// A shortest way of exactly so many edges that avoids stations; of several the shortest in metres, always the same.
-fn path(graph: &Graph<'_>, steps: usize) -> Option<Vec<usize>> {
+/// A shortest way of exactly so many edges that avoids stations, and from whose end the vehicle can come back if it is to
+/// return; of several the shortest in metres, always the same.
+fn path(graph: &Graph<'_>, steps: usize, returning: bool) -> Option<Vec<usize>> {
     if steps == 0 {
         return Some(Vec::new());
     }
     let mut best: Option<(f64, Vec<usize>)> = None;
     for (at, node) in graph.nodes.iter().enumerate().skip(1) {
-        if node.station || !graph.returns(at) {
+        if node.station || (returning && !graph.returns(at)) {
             continue;
         }
         let stop = Stop { node: at, before: None };
@@ -89,6 +93,7 @@ fn name_of(place: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Edge, Node};
     use tck_profile::SampleActions;
 
     fn need(names: &[&str]) -> CourseNeed {
@@ -115,6 +120,34 @@ mod tests {
                 .iter()
                 .all(|name| course.node(name).unwrap().id != *far)
         );
+    }
+
+    #[test]
+    fn a_floor_of_one_way_edges_is_told_from_one_that_is_too_small() {
+        let node = |number: usize| Node {
+            id: format!("n{number}"),
+            map_id: "hall".to_owned(),
+            x: number as f64,
+            y: 0.0,
+            theta: None,
+            deviation_xy: None,
+            deviation_theta: None,
+            station: false,
+        };
+        let edge = |number: usize| Edge {
+            id: format!("e{number}"),
+            start: format!("n{number}"),
+            end: format!("n{}", number + 1),
+            ..Edge::default()
+        };
+        let line = Layout::assemble((1..=7).map(node).collect(), (1..7).map(edge).collect(), Vec::new());
+        let why = |names: &[&str]| {
+            let found = line.outward(&need(names), &Standing::Node("n1".to_owned()));
+            found.unwrap_err().to_string()
+        };
+        let three = why(&["d"]);
+        assert!(three.contains("3 edges away from \"n1\" a way leads back"), "{three}");
+        assert!(why(&["j"]).starts_with("no node of the layout is 9 edges away"));
     }
 
     #[test]

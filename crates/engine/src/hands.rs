@@ -88,7 +88,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
                 "the device refuses what hook `{}` asks for: {why}",
                 operator.hook
             )),
-            HookOutcome::Skipped(why) => StepEnd::Skipped(why),
+            HookOutcome::Skipped(why) | HookOutcome::Unanswered(why) => StepEnd::Skipped(why),
             HookOutcome::Missing => StepEnd::Refused(format!("there is nobody for hook `{}`", operator.hook)),
         })
     }
@@ -222,6 +222,19 @@ impl<L: Link, O: Operator> Engine<L, O> {
         let outcome = if self.operator.runs_on_the_link() {
             operator::on_link(&mut self.link, name, &parameters)
         } else {
+            if let Some(asks) = self.operator.asks(name, &parameters) {
+                let question = Occurrence {
+                    at: self.link.now(),
+                    source: Source::Operator,
+                    direction: None,
+                    event: Event::Question {
+                        hook: name.to_owned(),
+                        text: asks.text,
+                        seconds: asks.within.as_secs(),
+                    },
+                };
+                self.recorder.record(question)?;
+            }
             let running = self.operator.run(name, parameters);
             tokio::pin!(running);
             loop {
@@ -242,11 +255,13 @@ impl<L: Link, O: Operator> Engine<L, O> {
         };
         let (ok, detail) = match &outcome {
             HookOutcome::Done(detail) => (true, detail.clone()),
-            HookOutcome::Failed(detail) | HookOutcome::Refused(detail) | HookOutcome::Skipped(detail) => {
-                (false, detail.clone())
-            }
+            HookOutcome::Failed(detail)
+            | HookOutcome::Refused(detail)
+            | HookOutcome::Skipped(detail)
+            | HookOutcome::Unanswered(detail) => (false, detail.clone()),
             HookOutcome::Missing => (false, "no such hook".to_owned()),
         };
+        self.unanswered |= matches!(outcome, HookOutcome::Unanswered(_));
         tracing::debug!(hook = name, ok, detail, "was run");
         let occurrence = Occurrence {
             at: self.link.now(),

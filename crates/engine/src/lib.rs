@@ -24,7 +24,7 @@ use serde_json::{Map, Value, json};
 
 pub use compose::Composer;
 pub use ids::IdForm;
-pub use operator::{HookOutcome, Operator};
+pub use operator::{Asks, HookOutcome, Operator};
 pub use recorder::{RecordError, Recorder};
 pub use unmade::ComposeError;
 
@@ -85,6 +85,8 @@ pub struct Engine<L, O> {
     pub map_files: Vec<bytes::Bytes>,
     /// Which time a test is run, where tests are repeated.
     pub repetition: Option<u32>,
+    /// Whether nobody has answered a question of the test that runs, or ran last.
+    pub unanswered: bool,
     /// When the last order was sent.
     last_order: Option<Moment>,
     /// The record since which the device was last said to be gone.
@@ -109,6 +111,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
             cancels: true,
             map_files: Vec::new(),
             repetition: None,
+            unanswered: false,
             last_order: None,
             told_gone: None,
             interrupt,

@@ -17,8 +17,19 @@ pub enum HookOutcome {
     Refused(String),
     /// The operator leaves the test out.
     Skipped(String),
+    /// The operator was asked, and nobody has answered.
+    Unanswered(String),
     /// There is no such hook, and nobody to ask.
     Missing,
+}
+
+/// What a person is asked to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Asks {
+    /// The words of the profile, values filled in.
+    pub text: String,
+    /// How long there is for the answer.
+    pub within: Duration,
 }
 
 /// Runs hooks: a command, an HTTP request, a prompt to a person, or a command to a reference device.
@@ -34,6 +45,12 @@ pub trait Operator {
 
     /// Runs one and waits for its end.
     async fn run(&mut self, hook: &str, parameters: Map<String, Value>) -> HookOutcome;
+
+    /// What a person is asked when this hook is run, where one is.
+    fn asks(&self, hook: &str, parameters: &Map<String, Value>) -> Option<Asks> {
+        let _ = (hook, parameters);
+        None
+    }
 
     /// Whether nothing is done for this hook but to wait for an order or instant action that comes by itself, and for
     /// how long.

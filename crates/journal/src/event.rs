@@ -249,6 +249,15 @@ pub enum Event {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         vehicle: Option<String>,
     },
+    /// A person is asked to do something; what comes of it is the record of the hook.
+    Question {
+        /// Name of the hook.
+        hook: String,
+        /// What the person is to do.
+        text: String,
+        /// How many seconds there are for the answer.
+        seconds: u64,
+    },
     /// A person was asked, and answered.
     Answer {
         /// What was asked.

@@ -146,6 +146,11 @@ pub enum Reason {
         /// The test that failed.
         test: String,
     },
+    /// The time that the run may take was used up, or the test would have taken more than was left of it.
+    OverBudget {
+        /// How long the run may take, in seconds.
+        budget: u64,
+    },
     /// Several tests before did not reach this precondition.
     SetAside {
         /// File and line of the precondition.
@@ -306,6 +311,7 @@ impl fmt::Display for Reason {
                 f.write_str("the factsheet says that ids are numbers, and one with letters is needed")
             }
             Self::AfterFailure { test } => write!(f, "left out, because {test} failed (--fail-fast)"),
+            Self::OverBudget { budget } => write!(f, "not carried out: budget (--budget {})", in_units(*budget)),
             Self::SetAside { place, tests } => write!(
                 f,
                 "set aside: the precondition at {place} was not reached in {}",
@@ -338,6 +344,16 @@ impl fmt::Display for Reason {
     }
 }
 
+/// A time as it is given on the command line: `90s`, `20m`, `2h`.
+fn in_units(seconds: u64) -> String {
+    match seconds {
+        0 => "0s".to_owned(),
+        whole if whole % 3_600 == 0 => format!("{}h", whole / 3_600),
+        whole if whole % 60 == 0 => format!("{}m", whole / 60),
+        whole => format!("{whole}s"),
+    }
+}
+
 impl fmt::Display for OwnError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.error)?;
@@ -364,6 +380,14 @@ mod tests {
         let older: Gate = serde_json::from_str(r#"{"not-applicable":"the factsheet does not list: x"}"#).unwrap();
         let sentence = Reason::observed("the factsheet does not list: x");
         assert_eq!(older, Gate::NotApplicable(sentence));
+    }
+
+    #[test]
+    fn a_budget_is_told_as_it_is_given() {
+        let told = |budget| Reason::OverBudget { budget }.to_string();
+        assert_eq!(told(90), "not carried out: budget (--budget 90s)");
+        assert_eq!(told(1_200), "not carried out: budget (--budget 20m)");
+        assert_eq!(told(7_200), "not carried out: budget (--budget 2h)");
     }
 
     #[test]

@@ -7,8 +7,9 @@
 use tck_base::diagnostic::Diagnostic;
 use tck_base::verdict::Verdict;
 use tck_pack::{Catalogue, Mood, Pack, Requirement};
-use tck_result::{Decision, Waited};
+use tck_result::Decision;
 
+use super::hidden::Open;
 use super::step::{Clause, Holds};
 
 /// The mood of a requirement in this version; `None` when the version does not have it.
@@ -19,13 +20,14 @@ pub(super) fn mood<'a>(catalogue: &'a Catalogue, pack: &Pack, id: &str) -> Optio
 }
 
 /// Turns a clause into a decision; `None` when the version does not have the requirement.
-pub(super) fn decide(
-    clause: Clause,
-    path: &str,
-    waited: Option<Waited>,
-    catalogue: &Catalogue,
-    pack: &Pack,
-) -> Option<Decision> {
+pub(super) fn decide(open: Open, catalogue: &Catalogue, pack: &Pack) -> Option<Decision> {
+    let Open {
+        clause,
+        path,
+        waited,
+        sent,
+        ..
+    } = open;
     let (requirement, mood) = mood(catalogue, pack, clause.requirement.as_str())?;
     let verdict = match &clause.holds {
         Holds::Yes => Verdict::Pass,
@@ -38,6 +40,7 @@ pub(super) fn decide(
     let (word, place) = (format!("{path}.{}", clause.word), clause.span.place());
     let mut decision = Decision::new(clause.requirement.as_str(), verdict, word, place, clause.message);
     decision.witness = clause.witness;
+    decision.sent = sent.filter(|_| broken);
     decision.expected = clause.expected;
     decision.nearest = clause.nearest;
     decision.waited = waited.filter(|_| broken);

@@ -5,7 +5,7 @@
 //! was told could not be observed. A monitor names the members it speaks for under `hides:`, and what was missed there
 //! is inconclusive in the tests it found something in. Which monitors do so is data.
 
-use tck_result::Waited;
+use tck_result::{Sent, Waited};
 
 use super::step::{Clause, Holds, Timing};
 
@@ -21,6 +21,8 @@ pub(super) struct Open {
     pub ended: u64,
     /// What was waited for.
     pub waited: Option<Waited>,
+    /// What was sent last.
+    pub sent: Option<Sent>,
     /// The vehicle has reported a new error since the message the step is about: it says itself that it did not obey.
     pub refused: bool,
     /// What it says about time, if it is a finding about time.
@@ -129,6 +131,7 @@ mod tests {
             walks: false,
             ended: 30,
             waited: None,
+            sent: None,
             of_time: None,
             refused: false,
         }

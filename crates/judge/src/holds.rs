@@ -17,6 +17,28 @@ pub enum Holds {
     Unseen(String),
 }
 
+impl Holds {
+    /// How it comes out where it is only preferred by a ruling of the catalogue: broken is a warning.
+    #[must_use]
+    pub(crate) fn of_preference(self) -> Self {
+        match self {
+            Self::No => Self::Softly,
+            other => other,
+        }
+    }
+
+    /// How a precondition comes out that is itself an obligation: it is broken when what is seen contradicts it. Coming late is
+    /// no matter of it, and nothing at all shows nothing.
+    #[must_use]
+    pub(crate) fn of_precondition(self, seen: u64) -> Self {
+        match self {
+            Self::Late | Self::Softly => Self::Yes,
+            Self::No if seen == 0 => Self::Unseen("nothing came that could have shown it".to_owned()),
+            other => other,
+        }
+    }
+}
+
 /// Why a clause cannot be weighed whose variable has no value.
 pub(crate) fn unbound_text(unbound: &Unbound) -> String {
     format!("the variable ${{{}}} has no value here", unbound.name)

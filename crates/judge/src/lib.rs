@@ -26,6 +26,7 @@ mod rules;
 mod run;
 mod said;
 mod scene;
+mod sent;
 mod side;
 mod step;
 mod test;

@@ -341,7 +341,7 @@ impl MonitorJudge {
 
 fn miss(pattern: &Bound, message: &serde_json::Value, forbidden: bool) -> String {
     if forbidden {
-        return format!("matches {}, which must not come", pattern.describe());
+        return format!("{}, which must not be", pattern.conditions());
     }
     match pattern.examine(message, None).misses.first() {
         Some(miss) => format!(
@@ -350,7 +350,7 @@ fn miss(pattern: &Bound, message: &serde_json::Value, forbidden: bool) -> String
             miss.found,
             miss.expected
         ),
-        None => format!("does not match {}", pattern.describe()),
+        None => format!("it does not show that {}", pattern.conditions()),
     }
 }
 

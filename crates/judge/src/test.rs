@@ -15,6 +15,7 @@ use super::grounds::Ground;
 use super::hidden::{Hidden, Open, hide};
 use super::own_errors::{is_refused, reported};
 use super::scene::Scene;
+use super::sent::sent;
 use super::step::{Evaluator, Holds, Position, Progress, StepOutcome, Timing};
 use super::timeline::Timeline;
 use tck_base::clock::Moment;
@@ -23,26 +24,8 @@ use tck_base::verdict::{Accumulated, Verdict};
 use tck_journal::event::{Event, StepEnd};
 use tck_journal::{Entry, Reason};
 use tck_pack::Role;
-use tck_result::{Decision, StepResult, TestResult, Waited};
+use tck_result::{Decision, Sent, StepResult, TestResult, Waited};
 use tck_suite::model::{Section, Step, Test, Verb};
-
-/// What is only preferred by a ruling of the catalogue: broken is a warning.
-fn of_preference(holds: Holds) -> Holds {
-    match holds {
-        Holds::No => Holds::Softly,
-        other => other,
-    }
-}
-
-/// How a precondition comes out that is itself an obligation: it is broken when what is seen contradicts it. Coming late is
-/// no matter of it, and nothing at all shows nothing.
-fn of_precondition(holds: Holds, seen: u64) -> Holds {
-    match holds {
-        Holds::Late | Holds::Softly => Holds::Yes,
-        Holds::No if seen == 0 => Holds::Unseen("nothing came that could have shown it".to_owned()),
-        other => other,
-    }
-}
 
 /// A test being judged.
 pub struct TestJudge {
@@ -70,6 +53,8 @@ pub struct TestJudge {
     /// Clauses of the steps that have ended. What another finding hides is known when the test is over, and nothing is
     /// decided before.
     open: Vec<Open>,
+    /// What was sent last.
+    sent: Option<Sent>,
     ended: bool,
 }
 
@@ -124,6 +109,7 @@ impl TestJudge {
             interrupted: None,
             hidden: Vec::new(),
             open: Vec::new(),
+            sent: None,
             ended: false,
         }
     }
@@ -279,6 +265,10 @@ impl TestJudge {
             StepEnd::Refused(why) | StepEnd::Skipped(why) => self.refused(section, &step, why),
             _ => {}
         }
+        if let Verb::Send(send) = &step.verb {
+            let since = self.entries.partition_point(|entry| entry.seq() < begun.0);
+            self.sent = sent(send, self.entries[since..].iter(), &self.bindings);
+        }
         for (name, value) in &outcome.saves {
             self.bindings.set(name, value.clone());
         }
@@ -318,7 +308,7 @@ impl TestJudge {
             for mut clause in outcome.clauses {
                 if owed {
                     clause.word = "owes";
-                    clause.holds = of_precondition(clause.holds, outcome.seen);
+                    clause.holds = clause.holds.of_precondition(outcome.seen);
                 }
                 // A walk that went wrong, or a message that shows what it must not, is no matter of time.
                 let of_time = match (&clause.holds, &outcome.timing) {
@@ -332,7 +322,7 @@ impl TestJudge {
                 };
                 if step.prefers && clause.word == "checks" {
                     clause.word = "prefers";
-                    clause.holds = of_preference(clause.holds);
+                    clause.holds = clause.holds.of_preference();
                 }
                 let waited = (clause.witness.is_none()).then(|| waited.clone());
                 self.open.push(Open {
@@ -341,6 +331,7 @@ impl TestJudge {
                     walks: matches!(step.verb, Verb::Action(_)),
                     ended: entry.seq(),
                     waited,
+                    sent: self.sent.clone(),
                     of_time,
                     refused: ground.role == Role::Agv && is_refused(timeline, self.mark),
                 });
@@ -453,7 +444,7 @@ impl TestJudge {
         let mut open = std::mem::take(&mut self.open);
         let hidden = hide(&mut open, &self.hidden);
         for open in open {
-            let decision = decide(open.clause, &open.path, open.waited, &ground.catalogue, &ground.pack);
+            let decision = decide(open, &ground.catalogue, &ground.pack);
             self.push(decision);
         }
         let why = match (&self.trouble, &self.preamble, &self.body) {

@@ -188,6 +188,12 @@ pub struct Requirement {
     pub needs: Vec<String>,
     /// The ruling where the text is silent or contradicts itself.
     pub interpretation: Option<String>,
+    /// Why the ruling reads it so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub because: Option<String>,
+    /// What the other reading would be.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub otherwise: Option<String>,
     /// Where it is tracked, for a requirement of somebody's own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub link: Option<String>,
@@ -198,6 +204,13 @@ impl Requirement {
     #[must_use]
     pub fn in_version(&self, pack: &Pack) -> Option<&VersionNote> {
         self.versions.get(&pack.id)
+    }
+
+    /// Where it can be read: where it is tracked, or the heading of the public text of that version.
+    #[must_use]
+    pub fn link_in(&self, pack: &Pack) -> Option<String> {
+        let heading = || pack.link_to(&self.in_version(pack)?.section);
+        self.link.clone().or_else(heading)
     }
 }
 
@@ -317,6 +330,39 @@ mod tests {
         assert_eq!(count(Subject::Both), 33);
         assert_eq!(count(Subject::Integrator), 8);
         assert_eq!(count(Subject::Broker), 1);
+    }
+
+    #[test]
+    fn every_requirement_leads_to_its_heading_in_the_public_text() {
+        let packs = Packs::load(&Assets::of_source_tree().unwrap()).expect("packs");
+        for requirement in catalogue().all() {
+            for pack in packs.all().iter().filter(|pack| requirement.in_version(pack).is_some()) {
+                let link = requirement.link_in(pack);
+                let link = link.unwrap_or_else(|| panic!("{} has no heading in {}", requirement.id, pack.id));
+                assert!(
+                    link.starts_with("https://") && link.contains(&format!("{}/", pack.version)),
+                    "{link}"
+                );
+            }
+        }
+        let malformed = catalogue()
+            .get("ORD-REJ-01")
+            .unwrap()
+            .link_in(packs.get("2.1").unwrap());
+        assert!(
+            malformed
+                .unwrap()
+                .ends_with("VDA5050_EN.md#6641-vehicle-gets-a-malformed-new-order")
+        );
+    }
+
+    #[test]
+    fn a_reason_belongs_to_a_ruling() {
+        let text = "group: A\nchapter: x\nposition: 1\nrequirements:\n  - id: A-1\n    text: x\n    role: agv\n    \
+                    decided: active\n    in: { \"2.1\": { section: \"4\", mood: shall } }\n    stimulus: x\n    \
+                    observe: x\n    needs: []\n    because: y\n";
+        let problems = Catalogue::check_text("a.yaml", text).unwrap_err();
+        assert_eq!(problems[0].title, "`because` without an interpretation");
     }
 
     #[test]

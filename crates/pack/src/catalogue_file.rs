@@ -42,7 +42,7 @@ pub(super) fn read(source: &Arc<Source>, problems: &mut Vec<Diagnostic>) -> Opti
     Some(Chapter { position, requirements })
 }
 
-const KEYS: [&str; 11] = [
+const KEYS: [&str; 13] = [
     "id",
     "text",
     "role",
@@ -53,6 +53,8 @@ const KEYS: [&str; 11] = [
     "observe",
     "needs",
     "interpretation",
+    "because",
+    "otherwise",
     "link",
 ];
 
@@ -72,6 +74,17 @@ impl Reader<'_> {
             .iter()
             .filter_map(|need| self.as_text(need))
             .collect();
+        for reason in ["because", "otherwise"] {
+            if let Some(said) = node.get(reason).filter(|_| node.get("interpretation").is_none()) {
+                let title = format!("`{reason}` without an interpretation");
+                self.problem(
+                    said,
+                    &title,
+                    "there is no ruling",
+                    "write `interpretation`, or take this out",
+                );
+            }
+        }
         let requirement = Requirement {
             id: RequirementId::from(id.as_str()),
             group: group.to_owned(),
@@ -84,6 +97,8 @@ impl Reader<'_> {
             observe: self.text(node, "observe")?,
             needs,
             interpretation: node.get("interpretation").and_then(|text| self.as_text(text)),
+            because: node.get("because").and_then(|text| self.as_text(text)),
+            otherwise: node.get("otherwise").and_then(|text| self.as_text(text)),
             link: node.get("link").and_then(|link| self.link(link)),
         };
         Some((place.span.clone(), requirement))

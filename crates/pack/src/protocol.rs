@@ -67,6 +67,16 @@ struct Protocol {
     fields: Vec<FieldRule>,
     #[serde(default)]
     members: Names,
+    document: Option<Document>,
+}
+
+/// The public text of a version.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    url: String,
+    /// The anchor of each section.
+    headings: BTreeMap<String, String>,
 }
 
 /// One protocol version as data.
@@ -84,6 +94,7 @@ pub struct Pack {
     features: BTreeMap<String, bool>,
     fields: Vec<FieldRule>,
     names: Arc<Names>,
+    document: Option<Document>,
 }
 
 /// Why a pack could not be read.
@@ -153,6 +164,7 @@ impl Pack {
             features: protocol.features,
             fields: protocol.fields,
             names: Arc::new(protocol.members),
+            document: protocol.document,
         })
     }
 
@@ -243,6 +255,14 @@ impl Pack {
         self.fields
             .iter()
             .map(|rule| (rule.names().collect(), rule.requirement()))
+    }
+
+    /// Where a section of the public text of this version begins, as a link; `None` for what is no section of it.
+    #[must_use]
+    pub fn link_to(&self, section: &str) -> Option<String> {
+        let document = self.document.as_ref()?;
+        let anchor = document.headings.get(section)?;
+        Some(format!("{}#{anchor}", document.url))
     }
 
     /// What the version calls the members of messages (`[members]` of `protocol.toml`): what views are read by.

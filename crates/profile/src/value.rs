@@ -35,6 +35,8 @@ pub(super) struct Refusal {
     pub hint: Option<String>,
     /// Which element of a list is meant.
     pub element: Option<usize>,
+    /// What else is wrong in the same list.
+    pub more: Vec<Refusal>,
 }
 
 impl Refusal {
@@ -44,7 +46,18 @@ impl Refusal {
             label: label.into(),
             hint: None,
             element: None,
+            more: Vec::new(),
         }
+    }
+
+    /// All that is wrong in a list, as one.
+    fn all(refusals: Vec<Self>) -> Result<(), Self> {
+        let mut refusals = refusals.into_iter();
+        let Some(mut first) = refusals.next() else {
+            return Ok(());
+        };
+        first.more = refusals.collect();
+        Err(first)
     }
 
     fn hint(mut self, hint: impl Into<String>) -> Self {
@@ -89,6 +102,7 @@ impl Value {
             label: format!("this is {}", type_name(value)),
             hint: Some(format!("expected {}", kind.hint())),
             element: None,
+            more: Vec::new(),
         };
         match (kind, value) {
             (Kind::Flag, DeValue::Boolean(flag)) => Ok(Self::Flag(*flag)),
@@ -158,11 +172,13 @@ impl Value {
     }
 
     fn from_list(kind: Kind, items: Vec<String>, folder: &Path) -> Result<Self, Refusal> {
-        if let Some(at) = items
-            .iter()
-            .position(|item| item.trim().is_empty() && kind != Kind::Command)
-        {
-            return Err(Refusal::bad("nothing stands here").at(at));
+        if kind != Kind::Command {
+            let empty = items.iter().enumerate().filter(|(_, item)| item.trim().is_empty());
+            Refusal::all(
+                empty
+                    .map(|(at, _)| Refusal::bad("nothing stands here").at(at))
+                    .collect(),
+            )?;
         }
         match kind {
             Kind::Files => Ok(Self::Paths(items.iter().map(|item| folder.join(item)).collect())),
@@ -170,33 +186,38 @@ impl Value {
                 if items.first().is_none_or(String::is_empty) {
                     return Err(Refusal::bad("no program is named").hint(format!("expected {}", kind.hint())));
                 }
-                for (at, item) in items.iter().enumerate() {
-                    unknown_placeholder(item, COMMON_PLACEHOLDERS).map_err(|refusal| refusal.at(at))?;
-                }
-                Ok(Self::Texts(items))
+                let unknown = items.iter().enumerate().filter_map(|(at, item)| {
+                    let refusal = unknown_placeholder(item, COMMON_PLACEHOLDERS).err()?;
+                    Some(refusal.at(at))
+                });
+                Refusal::all(unknown.collect()).map(|()| Self::Texts(items))
             }
             Kind::Claims => {
                 let mut claims: Vec<Claim> = Vec::with_capacity(items.len());
+                let mut wrong = Vec::new();
                 for (at, item) in items.iter().enumerate() {
-                    let claim: Claim = item
-                        .parse()
-                        .map_err(|(label, hint)| Refusal::bad(label).hint(hint).at(at))?;
+                    let claim: Claim = match item.parse() {
+                        Ok(claim) => claim,
+                        Err((label, hint)) => {
+                            wrong.push(Refusal::bad(label).hint(hint).at(at));
+                            continue;
+                        }
+                    };
                     if let Some(earlier) = claims.iter().find(|earlier| earlier.contradicts(&claim)) {
-                        return Err(Refusal {
+                        wrong.push(Refusal {
                             code: "contradiction",
                             ..Refusal::bad(format!("`{earlier}` above says otherwise")).at(at)
                         });
                     }
                     claims.push(claim);
                 }
-                Ok(Self::Claims(claims))
+                Refusal::all(wrong).map(|()| Self::Claims(claims))
             }
             _ => {
                 let twice = |at: &usize| items[..*at].contains(&items[*at]);
-                match (0..items.len()).find(twice) {
-                    Some(at) => Err(Refusal::bad("named twice").at(at)),
-                    None => Ok(Self::Texts(items)),
-                }
+                let repeated = (0..items.len()).filter(twice);
+                let wrong = repeated.map(|at| Refusal::bad("named twice").at(at)).collect();
+                Refusal::all(wrong).map(|()| Self::Texts(items))
             }
         }
     }

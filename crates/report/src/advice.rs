@@ -26,7 +26,15 @@ pub(super) fn remedy(reason: &Reason) -> Option<String> {
         }
         Reason::NoTap => "connect the device to the address of [bench] listen, and leave `tap = false` out".to_owned(),
         Reason::NoFactsheet { capability } | Reason::NoList { capability } => {
-            format!("[device] claims: say whether the device has `{capability}`, or let its factsheet say it")
+            let claims = if capability.starts_with("limit ") {
+                format!("[\"{capability} = …\"]")
+            } else {
+                format!("[\"{capability}\"], or [\"no {capability}\"]")
+            };
+            format!("[device] claims = {claims}: say it, or let its factsheet say it")
+        }
+        Reason::OverBudget { .. } => {
+            "give the run more time (--budget), or go on with what is left (--resume)".to_owned()
         }
         Reason::NobodyToAsk { .. }
         | Reason::NothingForHook { .. }
@@ -79,5 +87,11 @@ mod tests {
         assert!(advice(&Reason::MotionNotAllowed).starts_with("[motion] allowed = true: "));
         let seen = "the vehicle stood in the way, and [motion] allowed = true";
         assert_eq!(advice(&Reason::observed(seen)), seen);
+        let capability = Reason::NoFactsheet {
+            capability: "action pick NODE".to_owned(),
+        };
+        assert!(
+            advice(&capability).starts_with("[device] claims = [\"action pick NODE\"], or [\"no action pick NODE\"]")
+        );
     }
 }

@@ -5,7 +5,7 @@
 
 use super::sources::Sources;
 use tck_base::verdict::Verdict;
-use tck_result::RunResult;
+use tck_result::{RunResult, Sent};
 
 /// How a program that ended by itself is called where requirements have their ids.
 pub const PROGRAM: &str = "device.command";
@@ -23,6 +23,8 @@ pub struct Finding<'a> {
     pub asks: Option<&'a str>,
     /// Whom it binds how, and where: `shall, §6.6.4`.
     pub origin: Option<String>,
+    /// What was sent before it was seen the first time.
+    pub sent: Option<&'a Sent>,
     /// What was seen the first time.
     pub seen: String,
     /// How often it was seen.
@@ -44,13 +46,18 @@ pub fn findings<'a>(result: &'a RunResult, sources: &'a Sources) -> Vec<Finding<
         for decision in test.decisions.iter().filter(|decision| bad(decision.verdict())) {
             let finding = row(&mut all, &decision.requirement, sources);
             let seen = match &decision.nearest {
-                Some(nearest) => format!("{} is {}, not {}", nearest.path, nearest.found, nearest.expected),
+                Some(nearest) => format!(
+                    "{} is {}, expected {}",
+                    nearest.place(),
+                    nearest.found,
+                    nearest.expected
+                ),
                 None => decision.message.clone(),
             };
             let at = decision
                 .witness
                 .or(decision.nearest.as_ref().map(|nearest| nearest.seq));
-            finding.see(decision.verdict(), 1, at, seen);
+            finding.see(decision.verdict(), 1, at, Seen::of(seen, decision.sent.as_ref()));
             if !finding.tests.contains(&test.id.as_str()) {
                 finding.tests.push(&test.id);
             }
@@ -63,7 +70,7 @@ pub fn findings<'a>(result: &'a RunResult, sources: &'a Sources) -> Vec<Finding<
                 found.verdict,
                 found.count,
                 found.first.first().copied(),
-                found.message.clone(),
+                Seen::of(found.message.clone(), None),
             );
             if !finding.monitors.contains(&monitor.id.as_str()) {
                 finding.monitors.push(&monitor.id);
@@ -80,6 +87,7 @@ pub fn findings<'a>(result: &'a RunResult, sources: &'a Sources) -> Vec<Finding<
             verdict: Verdict::Fail,
             asks: Some(STAYS),
             origin: Some("by the profile".to_owned()),
+            sent: None,
             seen: program.story().unwrap_or_default(),
             count: program.ends - program.excused,
             first: program.first().map(|end| end.seq),
@@ -91,9 +99,21 @@ pub fn findings<'a>(result: &'a RunResult, sources: &'a Sources) -> Vec<Finding<
     all
 }
 
-impl Finding<'_> {
+/// A sighting, and what was sent before it.
+struct Seen<'a> {
+    text: String,
+    sent: Option<&'a Sent>,
+}
+
+impl<'a> Seen<'a> {
+    fn of(text: String, sent: Option<&'a Sent>) -> Self {
+        Self { text, sent }
+    }
+}
+
+impl<'a> Finding<'a> {
     /// Takes one more sighting in. The worst of them is shown, and of equals the first.
-    fn see(&mut self, verdict: Verdict, times: u64, at: Option<u64>, seen: String) {
+    fn see(&mut self, verdict: Verdict, times: u64, at: Option<u64>, seen: Seen<'a>) {
         let is_new = self.count == 0;
         let is_earlier = match (at, self.first) {
             (Some(at), Some(first)) => at < first,
@@ -101,7 +121,8 @@ impl Finding<'_> {
             (None, _) => false,
         };
         if is_new || verdict > self.verdict || (verdict == self.verdict && is_earlier) {
-            self.seen = seen;
+            self.seen = seen.text;
+            self.sent = seen.sent;
             self.first = at;
         }
         self.verdict = self.verdict.join(verdict);
@@ -118,6 +139,7 @@ fn row<'a, 'r>(all: &'r mut Vec<Finding<'a>>, id: &'a str, sources: &'a Sources)
             verdict: Verdict::Warning,
             asks: known.map(|known| known.text.as_str()),
             origin: known.map(|known| format!("{}, §{}", known.mood, known.section)),
+            sent: None,
             seen: String::new(),
             count: 0,
             first: None,
@@ -139,6 +161,7 @@ mod tests {
             verdict: Verdict::Warning,
             asks: None,
             origin: None,
+            sent: None,
             seen: String::new(),
             count: 0,
             first: None,
@@ -150,10 +173,15 @@ mod tests {
     #[test]
     fn the_worst_sighting_is_shown_and_of_equals_the_first() {
         let mut finding = empty();
-        finding.see(Verdict::Warning, 1, Some(3), "slow".to_owned());
-        finding.see(Verdict::Fail, 2, Some(20), "wrong, later".to_owned());
-        finding.see(Verdict::Fail, 1, Some(9), "wrong".to_owned());
-        finding.see(Verdict::Fail, 1, None, "wrong, nobody knows when".to_owned());
+        finding.see(Verdict::Warning, 1, Some(3), Seen::of("slow".to_owned(), None));
+        finding.see(Verdict::Fail, 2, Some(20), Seen::of("wrong, later".to_owned(), None));
+        finding.see(Verdict::Fail, 1, Some(9), Seen::of("wrong".to_owned(), None));
+        finding.see(
+            Verdict::Fail,
+            1,
+            None,
+            Seen::of("wrong, nobody knows when".to_owned(), None),
+        );
         assert_eq!(
             (finding.verdict, finding.count, finding.first, finding.seen.as_str()),
             (Verdict::Fail, 5, Some(9), "wrong")

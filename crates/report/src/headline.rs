@@ -44,7 +44,7 @@ pub fn kind(entry: &Entry) -> String {
         Event::Served { .. } | Event::Fetched { .. } => "map server".to_owned(),
         Event::Hook { hook, .. } => format!("hook {}", short(&line(hook), VALUE)),
         Event::Vehicle { .. } => "mock AGV".to_owned(),
-        Event::Answer { .. } => "operator".to_owned(),
+        Event::Question { .. } | Event::Answer { .. } => "operator".to_owned(),
         Event::StepBegun { .. } | Event::StepEnded { .. } | Event::Mark { .. } => "step".to_owned(),
         Event::Program { .. } => "program".to_owned(),
         Event::Interrupted => "interruption".to_owned(),

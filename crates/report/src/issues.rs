@@ -200,11 +200,15 @@ fn sarif_log(issues: &[Issue<'_>], sources: &Sources, call: &Invocation<'_>) -> 
             None => line(id),
         };
         let section = known.map_or("", |known| known.section.as_str());
-        json!({
+        let mut rule = json!({
             "id": line(id),
             "shortDescription": { "text": text },
             "properties": { "section": line(section) },
-        })
+        });
+        if let Some(link) = known.and_then(|known| known.link.as_deref()) {
+            rule["helpUri"] = line(link).into();
+        }
+        rule
     });
     let rules: Vec<Value> = rules.collect();
     let found = issues.iter().map(|issue| {

@@ -432,6 +432,9 @@ fn finding(decision: &Decision) -> String {
         ..
     } = decision;
     let mut text = format!("{verdict}: {requirement}: {message}\n{clause} at {place}");
+    if let Some(sent) = &decision.sent {
+        let _ = write!(text, "\nsent: {sent}");
+    }
     if let Some(witness) = decision.witness {
         let _ = write!(text, "\ndecided by message #{witness}");
     }

@@ -213,6 +213,7 @@ mod tests {
             role: "agv".to_owned(),
             mood: "shall".to_owned(),
             section: "6.1".to_owned(),
+            link: None,
             interpretation: Some("Read as that.".to_owned()),
             decided: HowDecided::Passive,
             action: None,

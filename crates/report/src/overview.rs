@@ -96,6 +96,9 @@ fn row(finding: &Finding<'_>, journal: Option<&Journal>, color: Color, text: &mu
     if let Some(asks) = finding.asks {
         let _ = writeln!(text, "      asked  {}", short(&line(asks), 300));
     }
+    if let Some(sent) = finding.sent {
+        let _ = writeln!(text, "      sent   {}", short(&line(&sent.to_string()), 300));
+    }
     let _ = writeln!(text, "      seen   {}", short(&line(&finding.seen), 300));
     let monitors = finding.monitors.iter().map(|id| format!("monitor {id}"));
     let by: Vec<String> = finding

@@ -53,6 +53,8 @@ pub struct RequirementText {
     pub mood: String,
     /// Section of the standard.
     pub section: String,
+    /// Where that can be read.
+    pub link: Option<String>,
     /// The ruling where the standard is silent or contradicts itself.
     pub interpretation: Option<String>,
     /// How it can be decided.

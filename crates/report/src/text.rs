@@ -142,10 +142,21 @@ pub fn decision(decision: &Decision, sources: &Sources, journal: Option<&Journal
         let lead = color.gutter().apply_to(lead);
         let _ = writeln!(text, "{lead} {name:<8} {value}");
     };
+    let find = |seq| journal.and_then(|journal| journal.get(seq)).map(AsRef::as_ref);
+    if let Some(sent) = &decision.sent {
+        let message = match find(sent.seq) {
+            Some(entry) => reference(Some(entry), sent.seq),
+            None => format!("#{} {}", sent.seq, line(&sent.topic)),
+        };
+        let about = match sent.about() {
+            about if about.is_empty() => String::new(),
+            about => format!(": {}", short(&line(&about), 400)),
+        };
+        note("sent", format!("{message}{about}"));
+    }
     if let Some(expected) = &decision.expected {
         note("expected", short(&line(expected), 400).into_owned());
     }
-    let find = |seq| journal.and_then(|journal| journal.get(seq)).map(AsRef::as_ref);
     if let Some(Waited {
         seconds: time,
         since,
@@ -178,9 +189,9 @@ pub fn decision(decision: &Decision, sources: &Sources, journal: Option<&Journal
         note(
             "closest",
             format!(
-                "#{}{kind}{after}:  {} is {}, not {}",
+                "#{}{kind}{after}:  {} is {}, expected {}",
                 nearest.seq,
-                line(&nearest.path),
+                line(nearest.place()),
                 short(&line(&nearest.found), 160),
                 short(&line(&nearest.expected), 160)
             ),

@@ -5,6 +5,7 @@
 mod exploration;
 mod not_decided;
 mod program;
+mod sent;
 
 use std::collections::BTreeMap;
 
@@ -13,6 +14,7 @@ use serde::{Deserialize, Serialize};
 pub use self::exploration::{Answers, ExplorationResult, MemberResult, SaidResult};
 pub use self::not_decided::NotDecided;
 pub use self::program::{ProgramEnd, ProgramResult};
+pub use self::sent::{Sent, SentMember};
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_journal::Reason;
 use tck_journal::event::Setting;
@@ -174,6 +176,12 @@ impl RunResult {
         self.mode.as_deref() == Some(CERTIFY)
     }
 
+    /// Whether tests were left out because there was no time for them: they can be carried out later.
+    #[must_use]
+    pub fn ran_out_of_time(&self) -> bool {
+        self.tests.iter().any(TestResult::ran_out_of_time)
+    }
+
     /// The value of a setting, if it is set.
     #[must_use]
     pub fn setting(&self, name: &str) -> Option<&str> {
@@ -302,6 +310,12 @@ impl TestResult {
         first.is_some_and(|first| done.any(|other| other.verdict != first.verdict))
     }
 
+    /// Whether it was left out, or not repeated, because there was no time for it.
+    #[must_use]
+    pub fn ran_out_of_time(&self) -> bool {
+        matches!(self.cause, Some(Reason::OverBudget { .. }))
+    }
+
     /// How many of its repetitions were asked for and not carried out.
     #[must_use]
     pub fn left_out(&self) -> usize {
@@ -371,6 +385,9 @@ pub struct Decision {
     pub witness: Option<u64>,
     /// One line.
     pub message: String,
+    /// The last message that the test had sent; only where something is broken.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sent: Option<Sent>,
     /// What was expected, values filled in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expected: Option<String>,
@@ -399,6 +416,7 @@ impl Decision {
             place,
             witness: None,
             message,
+            sent: None,
             expected: None,
             nearest: None,
             waited: None,
@@ -437,6 +455,18 @@ pub struct NearestMiss {
     pub found: String,
     /// What should have stood there.
     pub expected: String,
+}
+
+impl NearestMiss {
+    /// The path, or that it is the message itself.
+    #[must_use]
+    pub fn place(&self) -> &str {
+        if self.path.is_empty() {
+            "the message"
+        } else {
+            &self.path
+        }
+    }
 }
 
 /// A wait that was part of a decision.

@@ -80,9 +80,10 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         };
         Ok(match self.engine.hook(&hook, Map::new(), true).await? {
             HookOutcome::Done(_) | HookOutcome::Missing => Ok(()),
-            HookOutcome::Failed(why) | HookOutcome::Refused(why) | HookOutcome::Skipped(why) => {
-                Err(format!("hook `{hook}` failed: {why}"))
-            }
+            HookOutcome::Failed(why)
+            | HookOutcome::Refused(why)
+            | HookOutcome::Skipped(why)
+            | HookOutcome::Unanswered(why) => Err(format!("hook `{hook}` failed: {why}")),
         })
     }
 
@@ -130,7 +131,10 @@ async fn off_and_on<L: Link, O: Operator>(session: &mut Session<'_, L, O>) -> Re
     };
     match session.engine.hook(&hook, Map::new(), true).await? {
         HookOutcome::Done(_) => {}
-        HookOutcome::Failed(failed) | HookOutcome::Refused(failed) | HookOutcome::Skipped(failed) => {
+        HookOutcome::Failed(failed)
+        | HookOutcome::Refused(failed)
+        | HookOutcome::Skipped(failed)
+        | HookOutcome::Unanswered(failed) => {
             return Ok(Err(format!("hook `{hook}` failed: {failed}")));
         }
         HookOutcome::Missing => return Ok(Err(format!("there is no hook `{hook}`"))),

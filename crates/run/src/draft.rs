@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use super::discover::Device;
 use super::sheet::Sheet;
 use tck_pack::{Hooks, Packs, Role};
-use tck_profile::SAMPLE_ACTIONS;
+use tck_profile::{HookExample, KEYS, SAMPLE_ACTIONS};
 
 /// What the person who asks for the profile says beside it.
 #[derive(Clone, Debug, Default)]
@@ -44,8 +44,57 @@ pub fn draft(device: &Device, wishes: &Wishes, packs: &Packs, known: &Hooks) -> 
     );
     text.push_str("# max-speed = 0.5\n");
     layout(device, wishes, &mut text);
+    certificate(&mut text);
     hooks(device.sheet(packs).as_ref(), known, &mut text);
     text
+}
+
+/// The text of `device.toml` for a master control: nobody hears of one on a broker what it can be asked for.
+#[must_use]
+pub fn draft_master_control(manufacturer: &str, serial_number: &str, wishes: &Wishes, known: &Hooks) -> String {
+    let mut text = "# Profile of a master control. Lines that begin with `# ` are proposals: take away the `# ` and fill them in. Next:\n\
+                    #   vda5050-tck validate device.toml\n#   vda5050-tck run --profile device.toml --plan\n"
+        .to_owned();
+    let _ = write!(
+        text,
+        "\n[device]\nrole = \"master-control\"\nmanufacturer = {}\nserial-number = {}\n",
+        quoted(manufacturer),
+        quoted(serial_number)
+    );
+    text.push_str("# Let the run start it; without this line it is waited for.\n");
+    text.push_str("# command = [\"./master-control\", \"--broker\", \"mqtt://{broker-host}:{broker-port}\"]\n");
+    text.push_str("\n[bench]\n# Where the master control connects. With a broker of the site: `broker`, and `tap = false` if it stays there.\n");
+    text.push_str("listen = \"127.0.0.1:1883\"\n");
+    let _ = writeln!(text, "# broker = {}\n# tap = false", quoted(&wishes.broker));
+    text.push_str("\n[layout]\n# The floor it plans on, with ways that lead back.\n");
+    match &wishes.lif {
+        Some(lif) => {
+            let _ = writeln!(text, "lif = {}", quoted(lif));
+        }
+        None => text.push_str("# lif = \"hall.lif.json\"\n"),
+    }
+    match (&wishes.lif, &wishes.vehicle_type) {
+        (Some(_), Some(vehicle_type)) => {
+            let _ = writeln!(text, "vehicle-type = {}", quoted(vehicle_type));
+        }
+        _ => text.push_str("# vehicle-type = \"…\"\n"),
+    }
+    text.push_str("\n[vehicles]\n# The vehicles it commands, which this tool plays.\n");
+    text.push_str("# manufacturer = \"mocks\"\n# serial-numbers = [\"mock-1\", \"mock-2\"]\n# start-node = \"…\"\n");
+    text.push_str("\n# What the master control is asked for. Exactly one of `run`, `http` and `prompt`. A parameter that a test does not\n# give is an empty text; an answer 409, 422 or 501 says that it does not do it.\n");
+    for hook in known.of(Role::MasterControl) {
+        let http = HookExample::of(hook).http;
+        let _ = write!(text, "\n# {}\n# [hooks.{}]\n# {http}\n", one_line(&hook.doc), hook.name);
+    }
+    text
+}
+
+fn certificate(text: &mut String) {
+    text.push_str("\n# [certificate]\n# For `certify`: who tests what for whom.\n");
+    let keys = KEYS.iter().filter_map(|key| key.path.strip_prefix("certificate."));
+    for key in keys {
+        let _ = writeln!(text, "# {key} = \"…\"");
+    }
 }
 
 fn identity(device: &Device, packs: &Packs, text: &mut String) {
@@ -73,8 +122,24 @@ fn identity(device: &Device, packs: &Packs, text: &mut String) {
         let _ = writeln!(text, "topic-template = {}", quoted(&template));
     }
     text.push_str("# Harmless actions that tests may use; without them the tests in question are inconclusive.\n");
-    text.push_str("# long-action = { type = \"…\" }\n# brief-action = { type = \"…\" }\n");
     let sheet = device.sheet(packs);
+    let own = sheet.as_ref().map_or_else(Vec::new, |sheet| own_actions(sheet, packs));
+    if !own.is_empty() {
+        let _ = writeln!(text, "# Of its own the factsheet has: {}", own.join(", "));
+    }
+    let proposed = own.first().cloned().unwrap_or_else(|| "…".to_owned());
+    for sample in ["long-action", "brief-action"] {
+        let _ = writeln!(text, "# {sample} = {{ type = {} }}", quoted(&proposed));
+    }
+    text.push_str("# What nobody else says: whether it can stop between two nodes, or on nodes only.\n");
+    text.push_str("# stops-between-nodes = true\n# node-bound = true\n");
+    match &sheet {
+        Some(_) => text.push_str("# What its factsheet does not say, or says wrongly:\n# claims = []\n"),
+        None => text.push_str(
+            "# No factsheet was heard; what one would say, word by word (`run --plan` has a row for each):\n\
+             # claims = [\"action stateRequest INSTANT\", \"no action pick\"]\n",
+        ),
+    }
     let has = |action: &&str| sheet.as_ref().is_some_and(|sheet| has_action(sheet, action));
     for sample in SAMPLE_ACTIONS
         .iter()
@@ -173,6 +238,14 @@ fn has_action(sheet: &Sheet, name: &str) -> bool {
     sheet.has_action(name, None) == Some(true)
 }
 
+/// The actions of its factsheet on nodes that the standard does not have.
+fn own_actions(sheet: &Sheet, packs: &Packs) -> Vec<String> {
+    let predefined = packs.latest().vocabulary().get("action");
+    let is_predefined = |name: &str| predefined.is_some_and(|actions| actions.get(name).is_some());
+    let names = sheet.node_actions().into_iter();
+    names.filter(|name| !is_predefined(name)).map(one_line).collect()
+}
+
 /// The predefined action that a sample action is about.
 fn predefined(sample: &str) -> Option<&'static str> {
     Some(match sample.strip_prefix("edge-").unwrap_or(sample) {
@@ -243,5 +316,49 @@ mod tests {
             // A vehicle that cannot charge has no charger that could be locked.
             assert!(text.contains("[hooks.place-load]") && !text.contains("[hooks.lock-charger]"));
         }
+    }
+
+    #[test]
+    fn what_the_factsheet_has_of_its_own_is_proposed() {
+        let library = tck_testing::library();
+        let action = |name: &str, scope: &str| json!({ "actionType": name, "actionScopes": [scope] });
+        let actions = json!([
+            action("pick", "NODE"),
+            action("beep", "INSTANT"),
+            action("lift", "NODE")
+        ]);
+        let device = Device {
+            factsheet: Some(json!({ "protocolFeatures": { "agvActions": actions } })),
+            ..Device::default()
+        };
+        let text = draft(&device, &Wishes::default(), &library.rules.packs, &library.rules.hooks);
+        assert!(text.contains("# Of its own the factsheet has: lift\n"), "{text}");
+        assert!(text.contains("# long-action = { type = \"lift\" }\n"), "{text}");
+        assert!(
+            text.contains("# [certificate]\n") && text.contains("# firmware-version = "),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn the_skeleton_for_a_master_control_is_a_profile_and_so_is_what_it_proposes() {
+        let wishes = Wishes {
+            broker: "mqtt://site:1883".to_owned(),
+            ..Wishes::default()
+        };
+        let text = draft_master_control("ACME", "fleet-1", &wishes, &tck_testing::library().rules.hooks);
+        let uncommented: Vec<&str> = text
+            .lines()
+            .map(|line| match line.strip_prefix("# ") {
+                Some(proposed) if proposed.starts_with("[hooks.") || proposed.starts_with("http = ") => proposed,
+                _ => line,
+            })
+            .collect();
+        for text in [text.clone(), uncommented.join("\n")] {
+            let read = tck_profile::check(&Source::new("device.toml", text.clone()), std::path::Path::new(""));
+            let profile = read.unwrap_or_else(|wrong| panic!("{}\n{text}", wrong[0])).profile;
+            assert_eq!(profile.device.role, Role::MasterControl);
+        }
+        assert!(text.contains("# [hooks.dispatch]"), "{text}");
     }
 }

@@ -130,6 +130,11 @@ impl Outlook {
         self.over += 1;
     }
 
+    /// How long a test takes that was to take so long.
+    pub(super) fn of_one(&self, planned: Duration) -> Duration {
+        planned + self.more.checked_div(self.over).unwrap_or_default()
+    }
+
     /// What is left.
     pub(super) fn left(&self) -> Duration {
         let each = self.more.checked_div(self.over).unwrap_or_default();
@@ -177,7 +182,9 @@ mod tests {
         let second = Duration::from_secs(1);
         let mut outlook = Outlook::of(second * 10, 10);
         assert_eq!(outlook.left(), second * 10);
+        assert_eq!(outlook.of_one(second), second);
         outlook.is_over(second, second * 31);
+        assert_eq!(outlook.of_one(second), second * 31);
         assert_eq!(outlook.left(), second * (9 + 9 * 30));
         outlook.is_over(second, second / 2);
         assert_eq!(outlook.left(), second * (8 + 8 * 15));

@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 use super::device::{DeviceProcess, GOODBYE_LIMIT};
 use super::person::{Answer, Person, ask};
 use super::program::program;
-use tck_engine::{HookOutcome, Operator};
+use tck_engine::{Asks, HookOutcome, Operator};
 use tck_net::bench::web;
 use tck_pack::HookInfo;
 use tck_profile::{Hook, HookAction, Secrets, show_duration};
@@ -60,6 +60,19 @@ impl ProfileHooks {
             person,
             means,
         }
+    }
+
+    /// What the placeholders of a hook stand for.
+    fn values(&self, hook: &Hook, parameters: &Map<String, Value>) -> BTreeMap<String, String> {
+        let mut values = self.common.clone();
+        values.extend(parameters.iter().map(|(name, value)| match value {
+            Value::String(text) => (name.clone(), text.clone()),
+            other => (name.clone(), other.to_string()),
+        }));
+        if matches!(hook.action, HookAction::Prompt(_)) {
+            in_words(&hook.info, &mut values);
+        }
+        values
     }
 
     async fn carry_out(&mut self, hook: &Hook, values: &BTreeMap<String, String>) -> HookOutcome {
@@ -136,6 +149,17 @@ impl Operator for ProfileHooks {
         unattended.map(|hook| hook.name.clone()).collect()
     }
 
+    fn asks(&self, hook: &str, parameters: &Map<String, Value>) -> Option<Asks> {
+        let hook = self.hooks.get(hook).filter(|_| self.person.is_some())?;
+        match hook.action.filled(&self.values(hook, parameters)) {
+            HookAction::Prompt(text) => Some(Asks {
+                text: self.means.secrets.out_of(&text),
+                within: hook.timeout,
+            }),
+            _ => None,
+        }
+    }
+
     fn natural_traffic(&self, hook: &str) -> Option<Duration> {
         let hook = self.hooks.get(hook)?;
         (hook.action == HookAction::NaturalTraffic).then_some(hook.timeout)
@@ -151,14 +175,7 @@ impl Operator for ProfileHooks {
         let Some(hook) = self.hooks.get(name).cloned() else {
             return HookOutcome::Missing;
         };
-        let mut values = self.common.clone();
-        values.extend(parameters.into_iter().map(|(name, value)| match value {
-            Value::String(text) => (name, text),
-            other => (name, other.to_string()),
-        }));
-        if matches!(hook.action, HookAction::Prompt(_)) {
-            in_words(&hook.info, &mut values);
-        }
+        let values = self.values(&hook, &parameters);
         // However it is done: a device that a hook ends does not end by itself.
         let ends = hook.info.may_end_the_device();
         if let (true, Some(device)) = (ends, &mut self.device) {
@@ -174,6 +191,7 @@ impl Operator for ProfileHooks {
             HookOutcome::Failed(text) => HookOutcome::Failed(shown(text)),
             HookOutcome::Refused(text) => HookOutcome::Refused(shown(text)),
             HookOutcome::Skipped(text) => HookOutcome::Skipped(shown(text)),
+            HookOutcome::Unanswered(text) => HookOutcome::Unanswered(shown(text)),
             HookOutcome::Missing => HookOutcome::Missing,
         }
     }
@@ -243,7 +261,7 @@ fn answered(answer: Answer, within: Duration) -> HookOutcome {
         Answer::Skip => HookOutcome::Skipped("the operator skipped the test".to_owned()),
         Answer::End => HookOutcome::Failed("the operator ended the run".to_owned()),
         // Nobody has broken anything: the test is undecided.
-        Answer::Silence => HookOutcome::Skipped(format!("nobody answered within {}", show_duration(within))),
+        Answer::Silence => HookOutcome::Unanswered(format!("nobody answered within {}", show_duration(within))),
         Answer::GivenUp => HookOutcome::Failed("given up: the run ends".to_owned()),
         Answer::Unasked(why) => HookOutcome::Failed(format!("the operator could not be asked: {why}")),
     }

@@ -41,6 +41,7 @@ pub fn sources(catalogue: &Catalogue, suites: &Suites, pack: &Pack) -> Sources {
             role: requirement.role.word().to_owned(),
             mood: note.mood.word().to_owned(),
             section: note.section.clone(),
+            link: requirement.link_in(pack),
             interpretation: requirement.interpretation.clone(),
             action: requirement.needs.iter().find_map(|need| offered(need)),
             decided: match &requirement.decided {

@@ -11,6 +11,7 @@ use super::device::{Surroundings as Onlookers, Tell};
 use super::files::files;
 use super::hooks::Means;
 use super::operators::{Commands, hooks_of};
+use super::overheard::{Overheard, overhear};
 use super::person::Person;
 use super::plan::{How, RunPlan};
 use super::request::Request;
@@ -58,6 +59,8 @@ pub struct SocketRun {
     pub hold: Hold,
     /// Turns true when nobody waits any more for the run to end in good order.
     pub quit: Option<tokio::sync::watch::Receiver<bool>>,
+    /// What the vehicle has left at its broker, once somebody has looked.
+    overheard: Option<Overheard>,
 }
 
 /// What a device needs that the harness starts itself.
@@ -137,6 +140,7 @@ impl SocketRun {
             device_log: None,
             hold: Hold::default(),
             quit: None,
+            overheard: None,
         }
     }
 
@@ -183,7 +187,36 @@ impl SocketRun {
             device_log: None,
             hold: Hold::default(),
             quit: None,
+            overheard: None,
         })
+    }
+
+    /// Looks what a vehicle has left at a broker of its own: its factsheet says what it can do before it is there.
+    ///
+    /// # Errors
+    /// When the address of the broker, or a certificate, cannot be used.
+    pub fn overhear(&mut self, pack: &Pack) -> Result<(), RunError> {
+        let (Source::Profile { .. }, BrokerChoice::External { url, access }, None) =
+            (&self.source, &self.options.broker, &self.device.fleet)
+        else {
+            return Ok(());
+        };
+        let endpoint = Endpoint::parse(url, access)?;
+        let Some(topic) = self.device.subject.topics(pack).remove("factsheet") else {
+            return Ok(());
+        };
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(1)
+            .enable_all()
+            .build()?;
+        self.overheard = Some(runtime.block_on(overhear(
+            endpoint,
+            self.options.own.client("plan"),
+            &topic,
+            pack.names(),
+        )));
+        runtime.shutdown_background();
+        Ok(())
     }
 
     /// What it would do, without a network: which tests, and what stands in the way of the others. What only the device
@@ -198,7 +231,11 @@ impl SocketRun {
             Source::Profile { profile, .. } => {
                 let hooks = profile.hooks.values();
                 let hooks = hooks.map(|hook| (hook.name.clone(), How::of(&hook.action)));
-                (hooks.collect(), None)
+                let sheet = match &self.overheard {
+                    Some(Overheard::Factsheet(sheet)) => Some(sheet.clone()),
+                    _ => None,
+                };
+                (hooks.collect(), sheet)
             }
         };
         let bench = BenchFacts {
@@ -219,13 +256,14 @@ impl SocketRun {
         let subject = self.device.subject.clone();
         let time = Value::Object(self.device.time.bindings());
         let (_, mut setup) = self.device.on(bench, self.request, library, pack);
-        if factsheet.is_some() {
+        if factsheet.is_some() && self.overheard.is_none() {
             let statements = &mut setup.capabilities.statements;
             statements.insert("active-map".to_owned(), true);
-            setup.capabilities.factsheet = factsheet;
         }
+        setup.capabilities.factsheet = factsheet.or(setup.capabilities.factsheet);
         RunPlan {
             retained,
+            known_from: self.overheard.as_ref().map(Overheard::sentence),
             ..RunPlan::of(&subject, pack, &time, setup, (&hooks, &library.rules.hooks))
         }
     }

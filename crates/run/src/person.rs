@@ -21,6 +21,21 @@ pub enum Answer {
     Unasked(String),
 }
 
+impl Answer {
+    /// The word for it in streams of events.
+    #[must_use]
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::Done => "done",
+            Self::Skip => "skip",
+            Self::End => "end",
+            Self::Silence => "silence",
+            Self::GivenUp => "given-up",
+            Self::Unasked(_) => "unasked",
+        }
+    }
+}
+
 /// Whether an answer is still wanted.
 #[derive(Clone, Debug, Default)]
 pub struct Wanted(Arc<AtomicBool>);

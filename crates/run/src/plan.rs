@@ -9,6 +9,7 @@ use serde_json::Value;
 
 use super::draw::draw;
 use super::estimate::{self, EDGE, Estimate};
+use super::floor::Floor;
 use super::risk::by_risk;
 use super::session::Setup;
 use tck_course::Layout;
@@ -114,6 +115,12 @@ pub struct RunPlan {
     /// The topics on which mock vehicles keep a message on a broker of somebody else, and which are cleared at the end.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub retained: Vec<String>,
+    /// From where it is known what the vehicle can do, or why that is not known yet; absent where nobody could look.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub known_from: Option<String>,
+    /// The floor, if there is a layout.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub floor: Option<Floor>,
 }
 
 impl RunPlan {
@@ -166,6 +173,11 @@ impl RunPlan {
             stands_still: setup.capabilities.motion.err(),
             tests: lines,
             retained: Vec::new(),
+            known_from: None,
+            floor: setup
+                .layout
+                .as_ref()
+                .map(|layout| Floor::of(layout, running.iter().copied())),
         }
     }
 

@@ -1,6 +1,7 @@
 //! What a run takes on: which tests, which of their many cases, and under which name.
 
 use std::str::FromStr;
+use std::time::Duration;
 
 use super::selection::{Criteria, Selection, SelectionError};
 use tck_judge::Library;
@@ -21,6 +22,8 @@ pub struct Request {
     pub fail_fast: bool,
     /// How often each test is run.
     pub repeat: u32,
+    /// How long the run may take; tests that do not fit into it are left out.
+    pub budget: Option<Duration>,
     /// Whether nothing is left to choose: the run is for a certificate.
     pub certifies: bool,
     /// What restricts the statement because of what was asked for, one sentence each.
@@ -85,6 +88,7 @@ pub struct RequestBuilder {
     same_draw: bool,
     fail_fast: bool,
     repeat: u32,
+    budget: Option<Duration>,
     certifies: bool,
     command: Vec<String>,
 }
@@ -159,6 +163,13 @@ impl RequestBuilder {
         self
     }
 
+    /// Leaves out tests that do not fit any more into this time.
+    #[must_use]
+    pub fn budget(mut self, budget: Duration) -> Self {
+        self.budget = Some(budget);
+        self
+    }
+
     /// Marks the run as one for a certificate.
     #[must_use]
     pub fn certifies(mut self) -> Self {
@@ -214,6 +225,7 @@ impl RequestBuilder {
             command: self.command,
             fail_fast: self.fail_fast,
             repeat: self.repeat.max(1),
+            budget: self.budget,
             certifies: self.certifies,
             limits: self.shard.map(limit).into_iter().collect(),
         })

@@ -1,6 +1,6 @@
 //! The course of a run.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -10,13 +10,12 @@ use tokio::sync::watch;
 use super::bindings::{course_of, own_bindings};
 use super::capabilities::Capabilities;
 use super::draw::draw;
-use super::estimate::{self, Estimate, Outlook};
+use super::estimate::Outlook;
 use super::presence::{Presence, gone};
 use super::rest::{Home, Obstacle};
 use super::risk::by_risk;
 use super::sheet::Sheet;
 use super::strikes::Strikes;
-use tck_base::clock::Moment;
 use tck_base::verdict::Verdict;
 use tck_course::Layout;
 use tck_engine::{Engine, EngineError, Operator, Recorder, Watcher};
@@ -55,6 +54,8 @@ pub struct Setup {
     pub fail_fast: bool,
     /// How often each test is run.
     pub repeat: u32,
+    /// How long the run may take; tests that do not fit into it are left out.
+    pub budget: Option<Duration>,
 }
 
 /// A finished run.
@@ -218,8 +219,8 @@ pub(super) struct Session<'a, L, O> {
     /// Preconditions that are not reached again and again.
     strikes: Strikes,
     /// What each of the tests was to take, and how long the run still takes; in virtual time nobody waits for it.
-    estimates: Vec<Duration>,
-    outlook: Outlook,
+    pub(super) estimates: Vec<Duration>,
+    pub(super) outlook: Outlook,
 }
 
 impl<'a, L: Link, O: Operator> Session<'a, L, O> {
@@ -247,6 +248,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
     }
 
     async fn carry_out(mut self, saved: &mut dyn FnMut(&RunJudge)) -> Result<End, EngineError> {
+        let run_begun = self.engine.link.now().moment;
         let admitted = self.admit().await?;
         self.draw();
         if let Err(why) = admitted {
@@ -273,14 +275,18 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         let mut plan = self.plan(gates.collect());
         self.record_plan(&plan)?;
         self.progress.planned(&plan);
-        self.tell_estimate(&plan);
+        self.estimate(&plan);
         let tests = self.setup.tests.clone();
         let runs = plan.tests.iter().filter(|planned| planned.gate == Gate::Runs).count();
         let runs = runs * self.setup.repeat as usize;
         let mut number = 0;
         let mut gone: Option<String> = None;
         let mut failed: Option<String> = None;
-        for (at, test) in tests.iter().enumerate() {
+        let mut without_time = 0;
+        // What nobody answered is asked again when all else is done.
+        let mut queue: VecDeque<(usize, bool)> = (0..tests.len()).map(|at| (at, false)).collect();
+        while let Some((at, again)) = queue.pop_front() {
+            let test = &tests[at];
             if plan.tests[at].gate != Gate::Runs {
                 continue;
             }
@@ -293,6 +299,19 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             }
             for repetition in 1..=self.setup.repeat {
                 if self.engine.interrupted() || failed.is_some() || repetition > 1 && gone.is_some() {
+                    break;
+                }
+                let over_budget = self.over_budget(at, run_begun);
+                if over_budget.is_some() && again {
+                    break;
+                }
+                if let Some(why) = over_budget {
+                    if without_time == 0 {
+                        self.progress
+                            .note("tests that do not fit into the budget any more are left out");
+                    }
+                    without_time += 1;
+                    plan.tests[at].gate = Gate::Unobservable(why);
                     break;
                 }
                 self.engine.repetition = (self.setup.repeat > 1).then_some(repetition);
@@ -318,15 +337,29 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
                     ready => ready,
                 };
                 match ready {
+                    // What came of it the first time stands.
+                    Err(_) if again => {}
                     Err(why) => plan.tests[at].gate = Gate::Unobservable(why),
                     Ok(own) => {
-                        self.progress.test_begun(test, number, runs);
+                        self.progress.test_begun(test, number.min(runs), runs);
+                        if again {
+                            self.progress
+                                .note(&format!("nobody answered in {} before; it is asked again", test.id));
+                        }
+                        self.engine.unanswered = false;
                         let begun = self.engine.link.now().moment;
                         gone = self.run_and_restore(test, own, number).await?;
                         if let Some(result) = self.engine.recorder.judge().done().last() {
                             self.progress.test_ended(result);
                             if self.setup.fail_fast && result.verdict == Some(Verdict::Fail) {
                                 failed = Some(result.id.clone());
+                            }
+                            // What was decided before the question stands, and is not taken back by another try.
+                            let mut decisions = result.decisions.iter();
+                            let is_open = self.engine.unanswered
+                                && decisions.all(|decision| decision.verdict() == Verdict::Inconclusive);
+                            if is_open && !again && self.setup.repeat == 1 {
+                                queue.push_back((at, true));
                             }
                         }
                         self.tell_left(at, begun);
@@ -337,6 +370,11 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         }
         if let Some(first) = &failed {
             let limit = format!("No test was run after {first}, which failed (--fail-fast).");
+            self.setup.limits.push(limit);
+        }
+        if without_time > 0 {
+            let limit =
+                format!("Of the selected tests {without_time} had no time (--budget): they were not carried out.");
             self.setup.limits.push(limit);
         }
         if let (Some(why), None) = (&gone, self.stopped()) {
@@ -366,43 +404,6 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
     fn stopped(&self) -> Option<End> {
         let flooded = self.engine.recorder.flood().map(|why| End::Flooded(why.to_owned()));
         flooded.or(self.engine.interrupted().then_some(End::Interrupted))
-    }
-
-    /// Says how long the run will take; in virtual time it is over before that is read.
-    fn tell_estimate(&mut self, plan: &Plan) {
-        if self.engine.operator.runs_on_the_link() {
-            return;
-        }
-        let times = self.engine.recorder.judge().ground().bindings.get("time");
-        let estimate = Estimate::of(
-            times,
-            self.setup.capabilities.factsheet.as_deref(),
-            self.setup.layout.as_ref(),
-            self.engine.operator.usual_time(),
-        );
-        let planned = self.setup.tests.iter().zip(&plan.tests);
-        let each = planned.map(|(test, planned)| match planned.gate {
-            Gate::Runs => Some(estimate.of_tests(std::iter::once(&**test))),
-            _ => None,
-        });
-        let each: Vec<Option<Duration>> = each.collect();
-        let runs = u32::try_from(each.iter().flatten().count()).unwrap_or(u32::MAX);
-        let planned = each.iter().flatten().sum::<Duration>() * self.setup.repeat;
-        self.outlook = Outlook::of(planned, runs * self.setup.repeat);
-        self.estimates = each.into_iter().map(Option::unwrap_or_default).collect();
-        self.progress.note(&format!(
-            "estimated time: {} (more if the device is slow)",
-            estimate::in_words(self.outlook.left())
-        ));
-    }
-
-    /// Says how much of the run is left, once a test is over that was begun then.
-    fn tell_left(&mut self, at: usize, begun: Moment) {
-        if let Some(planned) = self.estimates.get(at) {
-            let took = self.engine.link.now().moment.since(begun);
-            self.outlook.is_over(*planned, took);
-            self.progress.left(self.outlook.left());
-        }
     }
 
     fn plan(&self, tests: Vec<PlannedTest>) -> Plan {

@@ -205,6 +205,7 @@ impl DeviceUnderTest {
             run: request.run,
             fail_fast: request.fail_fast,
             repeat: request.repeat.max(1),
+            budget: request.budget,
         };
         (header, setup)
     }

@@ -43,6 +43,18 @@ impl Sheet {
         }))
     }
 
+    /// The actions that it lists for nodes.
+    #[must_use]
+    pub fn node_actions(&self) -> Vec<&str> {
+        let all = self
+            .protocol_features
+            .there()
+            .and_then(|features| features.actions.there());
+        let all = all.into_iter().flat_map(|actions| actions.iter());
+        let of_nodes = all.filter(|action| action.action_scopes.texts().any(|scope| scope == "NODE"));
+        of_nodes.filter_map(|action| action.action_type.text()).collect()
+    }
+
     /// Whether it lists an optional parameter; `None` when it has no such list.
     #[must_use]
     pub fn has_optional(&self, path: &str) -> Option<bool> {

@@ -55,6 +55,8 @@ pub struct VirtualRun {
     pub fail_fast: bool,
     /// How often each test is run.
     pub repeat: u32,
+    /// How long the run may take; tests that do not fit into it are left out.
+    pub budget: Option<Duration>,
     /// The records of a run that broke off, with which this one goes on.
     pub earlier: Option<Journal>,
     /// Whether nothing is left to choose: the run is for a certificate.
@@ -92,6 +94,7 @@ impl VirtualRun {
             command: Vec::new(),
             fail_fast: false,
             repeat: 1,
+            budget: None,
             earlier: None,
             certifies: false,
             settings: Vec::new(),
@@ -182,6 +185,7 @@ pub async fn run_virtually(
         command: request.command,
         fail_fast: request.fail_fast,
         repeat: request.repeat,
+        budget: request.budget,
         certifies: request.certifies,
         limits: request.limits,
     };

@@ -102,10 +102,7 @@ pub(super) fn walk(node: &Node, problems: &mut Problems) -> Option<Walk> {
         );
         return None;
     }
-    Some(Walk {
-        stations,
-        text: text.to_owned(),
-    })
+    Some(Walk { stations })
 }
 
 /// One entry of `needs:`.

@@ -519,8 +519,17 @@ pub struct ActionWalk {
 pub struct Walk {
     /// The stations in order.
     pub stations: Vec<Station>,
-    /// As written.
-    pub text: String,
+}
+
+impl std::fmt::Display for Walk {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        for (at, station) in self.stations.iter().enumerate() {
+            let before = if at == 0 { "" } else { ", then " };
+            let perhaps = if station.optional { "perhaps " } else { "" };
+            write!(f, "{before}{perhaps}{}", station.statuses.join(" or "))?;
+        }
+        Ok(())
+    }
 }
 
 /// One station of a walk.

@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::inspect::parse_role;
 use super::{AccessArgs, Format};
+use tck_pack::Role;
 
 const DISCOVER_HELP: &str = "\
 Examples:
@@ -62,6 +64,7 @@ const INIT_HELP: &str = "\
 Examples:
   vda5050-tck init --broker mqtt://127.0.0.1:1883 --manufacturer ACME --serial 0001
   vda5050-tck init --broker mqtt://127.0.0.1:1883 --lif hall.lif.json --vehicle-type ACME.Carrier
+  vda5050-tck init --role master-control --manufacturer ACME --serial fleet-1   a skeleton; nothing is listened to
   vda5050-tck init --suites own                      what tests of your own can begin with
 
 It listens as `discover` does and writes a commented profile. Nothing is sent to the device, and motion stays off.";
@@ -73,6 +76,9 @@ pub struct Init {
     /// Where to listen.
     #[command(flatten)]
     pub listen: ListenArgs,
+    /// Which side the profile is for; for a master control nothing is listened to [agv, master-control]
+    #[arg(long, value_name = "ROLE", value_parser = parse_role, default_value = "agv")]
+    pub role: Role,
     /// Manufacturer of the device; needed when several are heard
     #[arg(long, value_name = "NAME")]
     pub manufacturer: Option<String>,
@@ -95,6 +101,6 @@ pub struct Init {
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
     /// Write the built-in suites, the schemas for editors and every setting with its default into this folder, and no profile
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["broker", "username", "tls_ca", "client_cert", "client_key", "client_id", "topic", "seconds", "manufacturer", "serial", "lif", "file", "force"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["broker", "username", "tls_ca", "client_cert", "client_key", "client_id", "topic", "seconds", "role", "manufacturer", "serial", "lif", "file", "force"])]
     pub suites: Option<PathBuf>,
 }

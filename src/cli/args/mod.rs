@@ -292,6 +292,14 @@ impl OutputArgs {
     }
 }
 
+/// How people are asked.
+#[derive(Clone, Debug, Default, Args)]
+pub struct PeopleArgs {
+    /// Let questions be answered over HTTP as well, from this machine only; the address with its token is printed
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "127.0.0.1:0", help_heading = "People")]
+    pub questions: Option<String>,
+}
+
 /// What a pipeline reads.
 #[derive(Clone, Debug, Default, Args)]
 pub struct PipelineArgs {

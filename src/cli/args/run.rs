@@ -1,10 +1,11 @@
 //! `run`, `certify` and `qualify`: what runs tests.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::Args;
 
-use super::{DeviceArgs, Format, OutputArgs, PipelineArgs, SelectionArgs, SuiteArgs};
+use super::{DeviceArgs, Format, OutputArgs, PeopleArgs, PipelineArgs, SelectionArgs, SuiteArgs};
 use tck_run::Shard;
 
 const RUN_HELP: &str = "\
@@ -19,6 +20,7 @@ Examples:
   vda5050-tck run --virtual --filter 'chapter(6.6) and not tag(moves)'   see docs/selection.md
   vda5050-tck run --profile device.toml --repeat 5 order-update   is it the same five times?
   vda5050-tck run --profile device.toml --resume reports/latest   go on after an interruption
+  vda5050-tck run --profile device.toml --budget 20m   what does not fit is left out by name
   vda5050-tck run --profile device.toml --shard 2/4  the second quarter of the tests
   vda5050-tck run --profile device.toml --as junit=junit.xml   for a pipeline, whatever becomes of the run
 
@@ -44,6 +46,9 @@ pub struct Run {
     /// What a pipeline reads.
     #[command(flatten)]
     pub pipeline: PipelineArgs,
+    /// How people are asked.
+    #[command(flatten)]
+    pub people: PeopleArgs,
     /// Which suites.
     #[command(flatten)]
     pub suites: SuiteArgs,
@@ -94,6 +99,9 @@ pub struct Run {
     /// Make identifiers, the order of events and what is drawn from schemas and matrices repeatable
     #[arg(long, value_name = "NUMBER")]
     pub seed: Option<u64>,
+    /// How long the run may take, such as 20m or 2h; tests that do not fit any more are left out by name, and are no pass
+    #[arg(long, value_name = "TIME", value_parser = super::watch::time)]
+    pub budget: Option<Duration>,
     /// Whether it is a run for a certificate, which is alike for everybody: set by `certify`.
     #[arg(skip)]
     pub certificate: bool,
@@ -110,6 +118,7 @@ place and device comes from the section [certificate] of the profile, or from fl
 
 Examples:
   vda5050-tck certify --profile device.toml --tester \"A. Person\"
+  vda5050-tck certify --profile device.toml --resume reports/latest   go on after an interruption
   vda5050-tck report --certificate reports/latest > certificate.html   two to four pages of A4";
 
 /// What a certificate says about who tested what; each is also a setting of the profile.
@@ -181,6 +190,12 @@ pub struct Certify {
     /// Try every case from schemas and matrices, and not a few of them
     #[arg(long)]
     pub thorough: bool,
+    /// How long it may take, such as 20m or 2h; what does not fit any more is left for --resume, and there is no paper before
+    #[arg(long, value_name = "TIME", value_parser = super::watch::time)]
+    pub budget: Option<Duration>,
+    /// Go on with the certification in this folder, which was interrupted or had too little time: what it decided is kept
+    #[arg(long, value_name = "DIR", conflicts_with = "thorough")]
+    pub resume: Option<PathBuf>,
     /// Who tests what.
     #[command(flatten)]
     pub certificate: CertificateArgs,
@@ -190,6 +205,9 @@ pub struct Certify {
     /// What a pipeline reads.
     #[command(flatten)]
     pub pipeline: PipelineArgs,
+    /// How people are asked.
+    #[command(flatten)]
+    pub people: PeopleArgs,
 }
 
 const QUALIFY_HELP: &str = "\

@@ -35,4 +35,7 @@ pub struct SelectionArgs {
     /// Show what would be run, asked of people and driven, and run nothing
     #[arg(long)]
     pub plan: bool,
+    /// Draw the floor of the plan into this file, as SVG
+    #[arg(long, value_name = "FILE", requires = "plan")]
+    pub floor: Option<PathBuf>,
 }

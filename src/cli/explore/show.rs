@@ -103,7 +103,8 @@ pub(super) fn explored(
         if shown.shows.0 < shown.shows.1 {
             let _ = writeln!(text, "  shows    in {} of {} attempts", shown.shows.0, shown.shows.1);
         }
-        let _ = writeln!(text, "  again    vda5050-tck explore --replay {}", path(shown, place));
+        let again = again(std::env::args().skip(1), &path(shown, place));
+        let _ = writeln!(text, "  again    vda5050-tck {again}");
         text.push('\n');
     }
     if !explored.left_out.is_empty() {
@@ -170,6 +171,45 @@ fn finding(shown: &Shown, place: Place<'_>) -> serde_json::Value {
     })
 }
 
+/// What says how long an exploration is and what it says, each with a value; a conversation that is carried out again has that.
+const OF_EXPLORATION: [&str; 6] = [
+    "--budget",
+    "--conversations",
+    "--focus",
+    "--length",
+    "--replay",
+    "--shrink-budget",
+];
+
+/// The arguments with which one conversation is carried out again: on the same device, with the same suites.
+fn again(arguments: impl Iterator<Item = String>, file: &str) -> String {
+    let mut kept = Vec::new();
+    let mut is_value = false;
+    for argument in arguments {
+        if std::mem::take(&mut is_value) {
+            continue;
+        }
+        let (name, value) = argument.split_once('=').unzip();
+        if OF_EXPLORATION.contains(&name.unwrap_or(&argument)) {
+            is_value = value.is_none();
+            continue;
+        }
+        kept.push(quoted(&argument));
+    }
+    kept.push("--replay".to_owned());
+    kept.push(quoted(file));
+    kept.join(" ")
+}
+
+/// An argument as a shell takes it.
+fn quoted(argument: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./:=,@%+".contains(c);
+    if !argument.is_empty() && argument.chars().all(is_plain) {
+        return argument.to_owned();
+    }
+    format!("'{}'", argument.replace('\'', "'\\''"))
+}
+
 /// What became of conversations that were carried out again.
 pub(super) fn replayed(result: &RunResult) -> String {
     let mut text = String::new();
@@ -192,4 +232,28 @@ pub(super) fn replayed(result: &RunResult) -> String {
         }
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_printed_can_be_pasted() {
+        let given = [
+            "explore",
+            "--virtual",
+            "--suites",
+            "my own",
+            "--conversations",
+            "40",
+            "--focus=blink",
+            "--fault",
+            "x",
+        ];
+        assert_eq!(
+            again(given.map(str::to_owned).into_iter(), "reports/a/it's.yaml"),
+            "explore --virtual --suites 'my own' --fault x --replay 'reports/a/it'\\''s.yaml'"
+        );
+    }
 }

@@ -221,7 +221,7 @@ impl OnStage {
                 let place = Place {
                     profile: None,
                     folder: folder.clone(),
-                    person: person(&self.desk),
+                    person: person(&self.desk, false),
                     vehicles: None,
                 };
                 let mut run = SocketRun::of_profile(effective, library, pack, surroundings, place)?;

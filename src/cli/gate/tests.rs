@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 use super::*;
 use tck_base::diagnostic::{Source, Span};
+use tck_journal::Reason;
 use tck_net::bench::LinkError;
 use tck_report::junit::{self, Flavour, Inconclusive};
 use tck_result::{
@@ -44,7 +45,7 @@ const ENDS: [Way<End>; 8] = [
 ];
 
 /// What can come of a test that was selected.
-const TESTS: [Way<TestResult>; 12] = [
+const TESTS: [Way<TestResult>; 13] = [
     ("passed", true, || of(Some(Verdict::Pass), "ORD-01")),
     ("passed with a remark", true, || of(Some(Verdict::Warning), "ORD-01")),
     ("failed by something known", true, || of(Some(Verdict::Fail), KNOWN)),
@@ -56,6 +57,12 @@ const TESTS: [Way<TestResult>; 12] = [
     ("decided nothing", false, || of(None, "ORD-01")),
     ("was not carried out", false, || TestResult {
         journal: None,
+        ..of(Some(Verdict::Inconclusive), "ORD-01")
+    }),
+    ("had no time", false, || TestResult {
+        journal: None,
+        cause: Some(Reason::OverBudget { budget: 60 }),
+        decisions: Vec::new(),
         ..of(Some(Verdict::Inconclusive), "ORD-01")
     }),
     ("was repeated as often as asked", true, || {

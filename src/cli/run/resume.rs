@@ -43,12 +43,13 @@ const WHERE: &str = "bench.listen";
 pub(super) struct AboutRun<'a> {
     pub(super) subject: &'a Participant,
     pub(super) vantage: &'a str,
+    pub(super) mode: Option<&'a str>,
     pub(super) settings: &'a [Setting],
     pub(super) files: &'a BTreeMap<String, String>,
 }
 
 impl Earlier {
-    /// Reads a bundle.
+    /// Reads the bundle of a run that broke off, or that had no time for all of its tests.
     pub(super) fn read(folder: &Path, all: &[Arc<Test>], library: &Library) -> Result<Self, Problem> {
         let wrong = |title: String| Problem::from(Diagnostic::whole("resume", title));
         // `latest` leads elsewhere once the next run begins.
@@ -76,11 +77,16 @@ impl Earlier {
         let judged = judge::judged(&library.rules, journal.entries());
         let judged = judged.map_err(|error| wrong(format!("{}: {error}", folder.display())))?;
         let result = judged.result();
-        if !result.partial {
+        if !result.partial && !result.ran_out_of_time() {
             let why = format!("the run in {} came to its end: nothing is left of it", folder.display());
             return Err(Problem::NothingToDo(why));
         }
-        let left = judged.left();
+        let mut left = judged.left();
+        if !result.partial {
+            // What else could not be decided was tried.
+            let untried = |id: &String| result.tests.iter().any(|test| test.id == *id && test.ran_out_of_time());
+            left.retain(untried);
+        }
         let known = left.iter().filter_map(|id| all.iter().find(|test| test.id == *id));
         let tests: Vec<Arc<Test>> = known.cloned().collect();
         if tests.is_empty() {
@@ -114,6 +120,14 @@ impl Earlier {
             ("vantage", &header.vantage, &now.vantage.to_owned()),
             ("hash of the suites", &header.suites, &library.rules.sha256),
         ];
+        if header.mode.as_deref() != now.mode {
+            let command = |mode: Option<&str>| mode.unwrap_or("run").to_owned();
+            let before = command(header.mode.as_deref());
+            return Err(refused(format!(
+                "it was made by `{before}`, and this is `{}`",
+                command(now.mode)
+            )));
+        }
         let differs = facts.into_iter().find(|(_, before, now)| before != now);
         if let Some((what, before, now)) = differs {
             return Err(refused(format!("its {what} was `{before}`, and is `{now}` now")));

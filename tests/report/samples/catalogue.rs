@@ -130,6 +130,7 @@ pub fn sources() -> Sources {
                 role: "agv".to_owned(),
                 mood: (*mood).to_owned(),
                 section: (*section).to_owned(),
+                link: None,
                 interpretation: (*id == "ORD-REJ-12").then(|| {
                     "The table of error types is read as binding; another type is accepted with a remark only where the text gives none.".to_owned()
                 }),

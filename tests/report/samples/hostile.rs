@@ -229,6 +229,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
             role: evil(),
             mood: evil(),
             section: evil(),
+            link: None,
             interpretation: Some(evil()),
             decided: HowDecided::NotTestable(evil()),
             action: Some(evil()),

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::json;
 use vda5050_tck::journal::event::StepEnd;
 use vda5050_tck::journal::{Direction, Event, Journal, Packet, Payload, Will};
-use vda5050_tck::result::{Decision, MonitorFinding, MonitorResult, NearestMiss, RunResult, Waited};
+use vda5050_tck::result::{Decision, MonitorFinding, MonitorResult, NearestMiss, RunResult, Sent, SentMember, Waited};
 use vda5050_tck::verdict::Verdict;
 
 use super::parts::{decision, header, run, step, test};
@@ -158,8 +158,19 @@ pub fn fail() -> (RunResult, Journal) {
                     "no new error has errorType \"orderUpdateError\"",
                 ),
                 |decision| {
+                    decision.sent = Some(Sent {
+                        seq: late,
+                        topic: "order".to_owned(),
+                        members: vec![SentMember {
+                            path: "orderUpdateId".to_owned(),
+                            value: "0 (a number)".to_owned(),
+                        }],
+                        more: 0,
+                        raw: None,
+                    });
                     decision.expected = Some(
-                        "errors: { $hasNew: { errorType: \"orderUpdateError\", errorLevel: \"WARNING\" } }".to_owned(),
+                        "there is a new error where errorType is \"orderUpdateError\" and errorLevel is \"WARNING\""
+                            .to_owned(),
                     );
                     decision.nearest = nearest("errors[0].errorType", "\"orderError\"", "\"orderUpdateError\"");
                     decision.waited = Some(Waited {

@@ -46,7 +46,16 @@ enum Trail<'a> {
     Element(&'a Trail<'a>, usize),
 }
 
-impl Trail<'_> {
+impl<'a> Trail<'a> {
+    /// The member that holds the value.
+    fn member(&self) -> Option<&'a str> {
+        match self {
+            Self::Root => None,
+            Self::Member(_, name) => Some(name),
+            Self::Element(parent, _) => parent.member(),
+        }
+    }
+
     fn text(&self) -> String {
         match self {
             Self::Root => String::new(),
@@ -132,10 +141,10 @@ impl Bound {
                 self.compare_included(items, found, baseline, trail)
             }
             (BoundKind::Count(_), Some(Value::Array(found))) if !self.accepts(value, baseline) => {
-                self.miss(trail, &self.describe(), &format!("{} elements", found.len()))
+                self.miss(trail, &self.noun(None), &format!("{} elements", found.len()))
             }
             _ if self.accepts(value, baseline) => self.hit(),
-            _ => self.miss(trail, &self.describe(), &shown(value)),
+            _ => self.miss(trail, &self.noun(trail.member()), &shown(value)),
         }
     }
 
@@ -167,8 +176,8 @@ impl Bound {
                         Some(at) => {
                             let mut miss = self.miss(
                                 &Trail::Element(trail, *at),
-                                &format!("a new element {}", inner.describe()),
-                                &format!("already there before the stimulus: {}", shown(found.get(*at))),
+                                &self.noun(trail.member()),
+                                &format!("already there before: {}", shown(found.get(*at))),
                             );
                             miss.score.0 = inner.leaves();
                             miss
@@ -184,19 +193,14 @@ impl Bound {
             Element::AtMostOne if matching.len() <= 1 => decided_by(matching.first()),
             Element::None => {
                 let at = matching[0];
-                let expected = format!("no element {}", inner.describe());
+                let expected = self.noun(trail.member());
                 Examination {
                     witness: Some(path(at)),
                     ..self.miss(&Trail::Element(trail, at), &expected, &shown(found.get(at)))
                 }
             }
             Element::One | Element::AtMostOne => {
-                let how_many = if which == Element::One {
-                    "exactly one"
-                } else {
-                    "at most one"
-                };
-                let expected = format!("{how_many} element {}", inner.describe());
+                let expected = self.noun(trail.member());
                 let second = matching[1];
                 Examination {
                     witness: Some(path(second)),
@@ -229,11 +233,11 @@ impl Bound {
             // The first of equals, so that reports are stable.
             .max_by(|left, right| left.1.cmp(&right.1).then(right.0.cmp(&left.0)));
         match best {
-            None => self.miss(trail, &format!("an element {}", inner.describe()), "an empty list"),
+            None => self.miss(trail, &self.noun(trail.member()), "an empty list"),
             // Nothing agrees with anything: the whole list says more than one odd element of many.
             Some((_, 0)) if found.len() > 1 => self.miss(
                 trail,
-                &format!("an element {}", inner.describe()),
+                &self.noun(trail.member()),
                 &shown(Some(&Value::Array(found.iter().take(8).cloned().collect()))),
             ),
             Some((at, _)) => {
@@ -304,7 +308,7 @@ impl Bound {
         let missing = &items[first];
         let mut examination = self.miss(
             trail,
-            &format!("an element {}", missing.describe()),
+            &missing.element(trail.member()),
             &shown(Some(&Value::Array(found.iter().take(8).cloned().collect()))),
         );
         examination.score.0 = first;

@@ -12,6 +12,7 @@ mod matches;
 mod number;
 #[cfg(test)]
 mod properties;
+mod words;
 
 pub use ast::{Compare, Comparison, Element, Elements, Pattern, PatternKind, Piece, Term, TermKind};
 pub use bindings::{Bindings, Unbound};

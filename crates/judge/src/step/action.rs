@@ -155,6 +155,14 @@ impl Walking {
         self.meant = meant.map(|(_, why)| why).or(self.meant.take());
     }
 
+    /// What has become of the action, in words.
+    fn became(&self) -> String {
+        match self.walked.as_slice() {
+            [] => "has shown no status".to_owned(),
+            all => format!("became {}", all.join(", then ")),
+        }
+    }
+
     fn decided(&self) -> bool {
         let lost = self.through.left() && self.tolerated.as_ref().is_none_or(Track::left);
         self.through.done() || self.tolerated.as_ref().is_some_and(Track::done) || lost || self.lasting
@@ -173,10 +181,7 @@ impl Walking {
     }
 
     pub(super) fn allowances(&self) -> Vec<String> {
-        let told = format!(
-            "it is not waited for that this action ends, which is {}",
-            self.walked.join(" -> ")
-        );
+        let told = format!("it is not waited for that this action ends, which {}", self.became());
         if self.lasting && !self.through.done() {
             vec![told]
         } else {
@@ -194,11 +199,7 @@ impl Walking {
 
     pub(super) fn end(self, at: Moment, cut_short: Option<&str>) -> StepOutcome {
         let seq = self.last.as_ref().map(|entry| entry.seq());
-        let walked = if self.walked.is_empty() {
-            "no status".to_owned()
-        } else {
-            self.walked.join(" -> ")
-        };
+        let became = self.became();
         let waited = seconds(at.since(self.position.base));
         let arrived = self
             .last
@@ -208,18 +209,21 @@ impl Walking {
         let stopped = !self.decided() && cut_short.is_none();
         let (holds, message) = if self.through.done() {
             match arrived.filter(|took| *took > self.limit.soft) {
-                Some(took) => (Holds::Late, format!("walked {walked}, after {}", seconds(took))),
-                None => (Holds::Yes, format!("walked {walked}")),
+                Some(took) => (Holds::Late, format!("the action {became}, after {}", seconds(took))),
+                None => (Holds::Yes, format!("the action {became}")),
             }
         } else if self.lasting {
-            (Holds::Yes, format!("walked {walked}, and is known to go no further"))
+            (
+                Holds::Yes,
+                format!("the action {became}, and is known to go no further"),
+            )
         } else if self.tolerated.as_ref().is_some_and(Track::done) {
-            (Holds::Softly, format!("walked {walked}, which a ruling tolerates"))
+            (Holds::Softly, format!("the action {became}, which a ruling tolerates"))
         } else if let (true, Some(meant)) = (self.decided(), &self.meant) {
-            let why = format!("walked {walked}, which cannot be told, since {meant}");
+            let why = format!("the action {became}, which cannot be told, since {meant}");
             (Holds::Unseen(why.clone()), why)
         } else if self.decided() {
-            (Holds::No, format!("walked {walked}"))
+            (Holds::No, format!("the action {became}"))
         } else if let Some(why) = cut_short {
             (Holds::Unseen(why.to_owned()), why.to_owned())
         } else if self.walked.is_empty() {
@@ -229,17 +233,20 @@ impl Walking {
             );
             (Holds::No, message)
         } else {
-            (Holds::No, format!("walked {walked} and no further within {waited}"))
+            (
+                Holds::No,
+                format!("the action {became} and went no further within {waited}"),
+            )
         };
         let mut clauses = bound_clauses(&self.verb.checks, "checks", &self.span, &holds, seq, &message);
         for clause in &mut clauses {
-            clause.label = format!("walked {walked}");
-            clause.expected = Some(self.verb.through.text.clone());
+            clause.label = format!("the action {became}");
+            clause.expected = Some(format!("the action becomes {}", self.verb.through));
             clause.nearest = seq.filter(|_| stopped).map(|seq| NearestMiss {
                 seq,
                 path: self.names.name(StateView::action_states).unwrap_or_default().to_owned(),
-                found: walked.clone(),
-                expected: self.verb.through.text.clone(),
+                found: self.walked.join(", then "),
+                expected: self.verb.through.to_string(),
             });
         }
         let message_json = self.last.as_ref().and_then(|entry| entry.json());
@@ -276,7 +283,6 @@ mod tests {
         };
         Walk {
             stations: text.split("->").map(|part| station(part.trim())).collect(),
-            text: text.to_owned(),
         }
     }
 
@@ -296,6 +302,15 @@ mod tests {
         assert!(track(text, &["WAITING", "FINISHED"]).left());
         assert!(!track(text, &["WAITING", "RUNNING"]).done());
         assert!(track(text, &["RUNNING", "WAITING"]).left());
+    }
+
+    #[test]
+    fn a_walk_is_told_in_words() {
+        let text = "WAITING? -> RUNNING -> FINISHED | FAILED";
+        assert_eq!(
+            walk(text).to_string(),
+            "perhaps WAITING, then RUNNING, then FINISHED or FAILED"
+        );
     }
 
     #[test]

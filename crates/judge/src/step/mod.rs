@@ -343,9 +343,13 @@ impl Selector {
 
     pub(super) fn expected(&self) -> Option<String> {
         match (&self.pattern, &self.check) {
-            (Some(pattern), Some(check)) => Some(format!("{} and check {}", pattern.describe(), check.name)),
-            (Some(pattern), None) => Some(pattern.describe()),
-            (None, Some(check)) => Some(format!("check {}", check.name)),
+            (Some(pattern), Some(check)) => Some(format!(
+                "{}, and what the check {} asks for",
+                pattern.conditions(),
+                check.name
+            )),
+            (Some(pattern), None) => Some(pattern.conditions()),
+            (None, Some(check)) => Some(format!("what the check {} asks for", check.name)),
             (None, None) => None,
         }
     }

@@ -80,7 +80,11 @@ impl Forbidding {
                 self.found(entry.seq(), holds, found);
             }
         } else if self.selector.takes(entry, scene) && !self.selector.is_excused(entry, scene) {
-            self.violated = Some((entry.seq(), format!("#{} is what must not come", entry.seq())));
+            let what = match &self.selector.pattern {
+                Some(pattern) => pattern.conditions(),
+                None => format!("no {} message may come", self.verb.topic),
+            };
+            self.violated = Some((entry.seq(), format!("#{} must not have come: {what}", entry.seq())));
         }
     }
 
@@ -157,7 +161,7 @@ impl Forbidding {
             clause.expected = self
                 .selector
                 .expected()
-                .map(|pattern| format!("no message with {pattern}"));
+                .map(|conditions| format!("no message where {conditions}"));
         }
         StepOutcome {
             reached: Some(if matches!(holds, Holds::Yes | Holds::Softly) {

@@ -90,7 +90,10 @@ impl Reader<'_> {
         });
     }
 
-    fn refuse(&mut self, what: &str, value: &Spanned<DeValue<'_>>, refusal: Refusal) {
+    fn refuse(&mut self, what: &str, value: &Spanned<DeValue<'_>>, mut refusal: Refusal) {
+        for more in std::mem::take(&mut refusal.more) {
+            self.refuse(what, value, more);
+        }
         let at = match (refusal.element, value.get_ref()) {
             (Some(element), DeValue::Array(items)) => items.get(element).map_or(value.span(), Spanned::span),
             _ => value.span(),

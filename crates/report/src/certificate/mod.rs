@@ -42,8 +42,8 @@ pub enum CertificateError {
     /// The run was another one than `certify`.
     #[error("this run was not made by `certify`: parts of it were left to choose")]
     OtherRun,
-    /// The run ended early.
-    #[error("this run ended before its plan did, and a part certifies nothing")]
+    /// The run ended early, or there was no time for all of its tests.
+    #[error("this run ended before its plan did, and a part certifies nothing; `certify --resume` goes on with it")]
     Partial,
     /// The suites are not the built-in ones.
     #[error("the suites of this run differ from the built-in ones")]
@@ -64,7 +64,7 @@ pub fn render(result: &RunResult, sources: &Sources, root: &str) -> Result<Strin
     if !result.certifies() {
         return Err(CertificateError::OtherRun);
     }
-    if result.partial {
+    if result.partial || result.ran_out_of_time() {
         return Err(CertificateError::Partial);
     }
     if result.suites_modified {

@@ -44,6 +44,10 @@ pub fn choose(test: &TestResult, gallery: &mut Gallery<'_>) -> Option<String> {
         if let Some(nearest) = &decision.nearest {
             places.entry(nearest.seq).or_default().push(&nearest.path);
         }
+        if let Some(sent) = &decision.sent {
+            let members = sent.members.iter().map(|member| member.path.as_str());
+            places.entry(sent.seq).or_default().extend(members);
+        }
     }
     for of_one in places.values_mut().filter(|places| places.is_empty()) {
         // Nothing to mark, but the message is shown unfolded.
@@ -56,6 +60,8 @@ pub fn choose(test: &TestResult, gallery: &mut Gallery<'_>) -> Option<String> {
             .filter_map(|finding| finding.waited.as_ref())
             .map(|w| (w.since, "stimulus")),
     );
+    let of_findings = test.findings().filter_map(|finding| finding.sent.as_ref());
+    wanted.extend(of_findings.map(|sent| (sent.seq, "stimulus")));
     let (first, last) = test.journal?;
     let all: Vec<_> = journal
         .entries()

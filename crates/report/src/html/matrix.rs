@@ -23,6 +23,8 @@ pub struct RequirementView {
     pub badge: Badge,
     pub id: String,
     pub section: String,
+    /// Where the section can be read.
+    pub text_link: Option<String>,
     pub mood: String,
     pub text: String,
     /// How the catalogue says it can be decided.
@@ -104,6 +106,7 @@ fn row(
         badge: Badge::of_requirement(requirement),
         id: requirement.id.clone(),
         section: known.map(|known| known.section.clone()).unwrap_or_default(),
+        text_link: known.and_then(|known| known.link.clone()),
         mood: known.map(|known| known.mood.clone()).unwrap_or_default(),
         text: known.map(|known| known.text.clone()).unwrap_or_default(),
         how: match known.map(|known| &known.decided) {

@@ -58,6 +58,8 @@ pub struct DecisionView {
     pub requirement: String,
     pub link: Option<String>,
     pub origin: String,
+    /// Where the obligation can be read.
+    pub text_link: Option<String>,
     pub text: String,
     pub clause: String,
     pub place: String,
@@ -65,12 +67,24 @@ pub struct DecisionView {
     /// Whether the explanation says it too.
     pub said: bool,
     pub witness: Option<(u64, bool)>,
+    pub sent: Option<SentView>,
     pub expected: Option<String>,
     pub nearest: Option<NearestView>,
     pub waited: Option<String>,
     pub explanation: Option<String>,
     pub interpretation: Option<String>,
     pub deviation: Option<String>,
+}
+
+/// What was sent before.
+pub struct SentView {
+    pub seq: u64,
+    pub shown: bool,
+    pub headline: String,
+    /// Place and value.
+    pub members: Vec<(String, String)>,
+    pub more: usize,
+    pub raw: Option<String>,
 }
 
 /// The nearest miss.
@@ -282,6 +296,7 @@ fn decision_view(
         origin: known
             .map(|known| format!("{}, §{}", known.mood, known.section))
             .unwrap_or_default(),
+        text_link: known.and_then(|known| known.link.clone()),
         text: known.map(|known| known.text.clone()).unwrap_or_default(),
         clause: decision.clause.clone(),
         place: decision.place.clone(),
@@ -291,12 +306,24 @@ fn decision_view(
             .as_ref()
             .is_some_and(|text| text.contains(&decision.message)),
         witness: decision.witness.map(|seq| (seq, gallery.shows(seq))),
+        sent: decision.sent.as_ref().map(|sent| SentView {
+            seq: sent.seq,
+            shown: gallery.shows(sent.seq),
+            headline: see(sent.seq),
+            members: sent
+                .members
+                .iter()
+                .map(|member| (member.path.clone(), clean::block(&member.value).into_owned()))
+                .collect(),
+            more: sent.more,
+            raw: sent.raw.as_deref().map(|raw| clean::block(raw).into_owned()),
+        }),
         expected: decision.expected.as_deref().map(|text| clean::block(text).into_owned()),
         nearest: decision.nearest.as_ref().map(|nearest| NearestView {
             seq: nearest.seq,
             shown: gallery.shows(nearest.seq),
             headline: see(nearest.seq),
-            path: nearest.path.clone(),
+            path: nearest.place().to_owned(),
             found: clean::block(&nearest.found).into_owned(),
             expected: clean::block(&nearest.expected).into_owned(),
         }),

@@ -209,6 +209,7 @@ fn row(
                 text(&with.to_string()),
             )
         }
+        Event::Question { text: asked, .. } => plain(entry, What::Box(Harness), "the operator is asked", text(asked)),
         Event::Answer { answer, .. } => plain(entry, What::Box(Harness), "the operator answers", text(answer)),
         Event::Note { text: note } => plain(entry, What::Box(Harness), "note", text(note)),
         Event::Waived { waiver } => plain(entry, What::Box(Harness), "from here on", text(&waiver.why)),
