@@ -355,7 +355,11 @@ mod tests {
             })
             .collect();
         for text in [text.clone(), uncommented.join("\n")] {
-            let read = tck_profile::check(&Source::new("device.toml", text.clone()), std::path::Path::new(""));
+            let read = tck_profile::check(
+                &Source::new("device.toml", text.clone()),
+                std::path::Path::new(""),
+                &tck_testing::library().rules.hooks,
+            );
             let profile = read.unwrap_or_else(|wrong| panic!("{}\n{text}", wrong[0])).profile;
             assert_eq!(profile.device.role, Role::MasterControl);
         }

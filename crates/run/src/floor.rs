@@ -122,8 +122,12 @@ mod tests {
             }
         }
         text += "]\n[device]\nmanufacturer = \"ACME\"\nserial-number = \"1\"\n";
-        let effective =
-            tck_profile::check(&Source::new("device.toml", text), std::path::Path::new("")).expect("a profile");
+        let effective = tck_profile::check(
+            &Source::new("device.toml", text),
+            std::path::Path::new(""),
+            &tck_testing::library().rules.hooks,
+        )
+        .expect("a profile");
         Layout::of_profile(&effective.profile).expect("a layout").expect("some")
     }
 
