@@ -145,7 +145,7 @@ pub fn decision(decision: &Decision, sources: &Sources, journal: Option<&Journal
     let find = |seq| journal.and_then(|journal| journal.get(seq)).map(AsRef::as_ref);
     if let Some(sent) = &decision.sent {
         let message = match find(sent.seq) {
-            Some(entry) => reference(Some(entry), sent.seq),
+            Some(_) => reference(journal, sent.seq),
             None => format!("#{} {}", sent.seq, line(&sent.topic)),
         };
         let about = match sent.about() {
