@@ -8,6 +8,7 @@
 
 mod assign;
 mod curve;
+mod doubts;
 mod graph;
 mod layout;
 mod lif;

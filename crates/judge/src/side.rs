@@ -43,7 +43,7 @@ impl SideJudge {
             Timeline::of_vehicles(&header.vehicles)
         };
         Ok(Self {
-            watches: Watches::begin(&monitors, &ground, vehicles, header.vantage == "tap"),
+            watches: Watches::begin(&monitors, &ground, vehicles, header.vantage == "tap").apart(),
             timeline,
             ground,
             company: None,
