@@ -8,8 +8,8 @@ use super::problem::Problem;
 use super::recordings::{broken, in_time, open, show};
 use tck_audit::crew::{self, Crew};
 use tck_audit::export::Export;
-use tck_audit::result::{Recording, VehicleResult, verdict_of};
-use tck_audit::{AuditError, Options, bundle, own_run};
+use tck_audit::result::{Recording, VehicleResult};
+use tck_audit::{AuditError, Options, Redactor, bundle, own_run};
 use tck_base::diagnostic::Diagnostic;
 use tck_capture::merge::Merged;
 use tck_capture::{CaptureError, Item, Message, Told};
@@ -45,13 +45,17 @@ pub fn audit(arguments: &Arguments) -> Result<Exit, Problem> {
         })
     })?;
     result.vehicles.extend(runs);
-    result.verdict = verdict_of(&result.vehicles);
+    result.conclude();
     if let Some(export) = export {
         export.finish(&result).map_err(not_written)?;
     }
     if let Some(folder) = &arguments.out {
-        let written = bundle::write(&result, folder);
-        written.map_err(|error| Problem::Environment(error.to_string()))?;
+        let written = bundle::write(&result, &library.rules, folder);
+        let root = written.map_err(|error| Problem::Environment(error.to_string()))?;
+        super::tell(&format!(
+            "the bundle in {} has the root hash sha256:{root}",
+            folder.display()
+        ));
     }
     if let Some(wanted) = &arguments.slice {
         return super::slice::slice(arguments, &library, &options, &result, wanted);
@@ -78,6 +82,10 @@ fn read(
         let mut recorded = open(path, number, arguments)?;
         units.push(recorded.unit());
         match recorded.read().map_err(|source| unreadable(&name, source))? {
+            Some(Item::Record(first)) if is_run(&first) && arguments.redact => {
+                let text = format!("{name} is the journal of a run, and only recordings are redacted");
+                return Err(usage(text));
+            }
             Some(Item::Record(first)) if is_run(&first) => {
                 let found = own_run(&library.rules, options, number, *first, &mut recorded)
                     .map_err(|error| usage(format!("{name}: {error}")))?;
@@ -92,6 +100,7 @@ fn read(
     let mut merged = Merged::new(all.collect()).map_err(broken)?;
     let bounded = arguments.from.is_some() || arguments.to.is_some();
     let progress = Counting::begin();
+    let mut redactor = redactor(arguments, library, options)?;
     while let Some(told) = merged.read().map_err(broken)? {
         if let (true, None, Told::Message(message)) = (bounded, told.at(), &told) {
             let place = format!("{}:{}", names[message.place.file], message.place.line);
@@ -99,6 +108,9 @@ fn read(
             return Err(usage(text));
         }
         if in_time(told.at(), arguments) {
+            let Some(told) = redacted(told, &mut redactor) else {
+                continue;
+            };
             if let Told::Message(message) = &told {
                 passing(crew, message)?;
             }
@@ -113,8 +125,33 @@ fn read(
     counted.sort_by_key(|(number, _)| *number);
     let counted = counted
         .into_iter()
-        .map(|(number, counted)| Recording::new(names[number].clone(), units[number], counted));
+        .map(|(number, counted)| Recording::new(names[number].clone(), units[number], counted).hashed());
     Ok(counted.collect())
+}
+
+/// What leaves out names and places, where that is asked for.
+pub(super) fn redactor(
+    arguments: &Arguments,
+    library: &Library,
+    options: &Options,
+) -> Result<Option<Redactor>, Problem> {
+    let redactor = arguments.redact.then(|| Redactor::new(&library.rules, options));
+    Ok(redactor.transpose()?)
+}
+
+/// What is left of what is told: of a connection nothing, where names are left out.
+pub(super) fn redacted(told: Told, redactor: &mut Option<Redactor>) -> Option<Told> {
+    match (told, redactor) {
+        (told, None) => Some(told),
+        (Told::Message(message), Some(redactor)) => {
+            let message = redactor.message(Message {
+                carried: None,
+                ..message
+            });
+            Some(Told::Message(message))
+        }
+        (Told::Wire(_), Some(_)) => None,
+    }
 }
 
 /// How far the reader is, for a person who waits.

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::args::{Format, Validate};
 use super::pieces::{Content, Form, Pieces};
 use super::problem::Problem;
-use tck_audit::{Flaw, single};
+use tck_audit::{Flaw, Hint, Hints, single};
 use tck_base::diagnostic::{Diagnostic, closest};
 use tck_base::verdict::Verdict;
 use tck_journal::event::PAYLOAD_LIMIT;
@@ -28,6 +28,16 @@ pub struct Counted {
     pub wrong: usize,
     /// Those with nothing worse than a warning.
     pub warned: usize,
+}
+
+/// By what messages are judged.
+pub struct Judging<'a> {
+    /// What was asked for.
+    pub arguments: &'a Validate,
+    /// The rules.
+    pub library: &'a Library,
+    /// Names to compare those in messages with.
+    pub hints: Hints,
 }
 
 /// How the messages of a file stand in it, as its beginning shows; `None` when it holds one message, or something else.
@@ -51,13 +61,8 @@ pub fn form(path: &Path, beginning: &[u8]) -> Option<Form> {
 }
 
 /// Checks every message of a file.
-pub fn batch(
-    name: &str,
-    input: impl BufRead,
-    form: Form,
-    arguments: &Validate,
-    library: &Library,
-) -> Result<Counted, Problem> {
+pub fn batch(name: &str, input: impl BufRead, form: Form, judging: &Judging<'_>) -> Result<Counted, Problem> {
+    let format = judging.arguments.format;
     let mut counted = Counted::default();
     let mut pieces = Pieces::new(input, form);
     let unreadable = |error| Diagnostic::whole("unreadable", format!("cannot read {name}: {error}"));
@@ -68,7 +73,7 @@ pub fn batch(
             column: piece.column,
         };
         let found = match piece.content {
-            Content::Message(bytes) => message(&bytes, begin, arguments, library),
+            Content::Message(bytes) => message(&bytes, begin, judging),
             Content::TooLarge(length) => too_large(length, begin),
             Content::Broken(why) => {
                 counted.messages -= 1;
@@ -77,15 +82,17 @@ pub fn batch(
             }
         };
         counted.add(&found.flaws);
-        for flaw in &found.flaws {
-            show(name, Some(counted.messages), flaw, arguments.format)?;
+        found.show(name, Some(counted.messages), format)?;
+        if found.is_recorded {
+            // What holds for one line of a recording holds for all of them.
+            break;
         }
     }
     Ok(counted)
 }
 
 /// Checks a file that holds one message.
-pub fn alone(name: &str, bytes: &[u8], arguments: &Validate, library: &Library) -> Result<(Counted, String), Problem> {
+pub fn alone(name: &str, bytes: &[u8], judging: &Judging<'_>) -> Result<(Counted, String), Problem> {
     let mut counted = Counted {
         messages: 1,
         ..Counted::default()
@@ -94,12 +101,10 @@ pub fn alone(name: &str, bytes: &[u8], arguments: &Validate, library: &Library) 
     let found = if bytes.len() > PAYLOAD_LIMIT {
         too_large(bytes.len() as u64, begin)
     } else {
-        message(bytes, begin, arguments, library)
+        message(bytes, begin, judging)
     };
     counted.add(&found.flaws);
-    for flaw in &found.flaws {
-        show(name, None, flaw, arguments.format)?;
-    }
+    found.show(name, None, judging.arguments.format)?;
     Ok((counted, found.what))
 }
 
@@ -124,9 +129,20 @@ struct Placed {
 }
 
 /// A message that was checked.
+#[derive(Default)]
 struct Checked {
     what: String,
     flaws: Vec<Placed>,
+    hints: Vec<Noted>,
+    /// Whether it is a line of a recording.
+    is_recorded: bool,
+}
+
+/// What is allowed and looks like a slip, and where it stands.
+struct Noted {
+    hint: Hint,
+    line: usize,
+    column: usize,
 }
 
 /// Where a message begins in its file, counted from 1.
@@ -171,7 +187,27 @@ impl Checked {
                 sentence: None,
                 nearest: hint,
             }],
+            ..Self::default()
         }
+    }
+
+    /// Prints what is wrong, and what looks like a slip.
+    fn show(&self, name: &str, number: Option<usize>, format: Format) -> Result<(), Problem> {
+        for flaw in &self.flaws {
+            show(name, number, flaw, format)?;
+        }
+        for Noted { hint, line: at, column } in &self.hints {
+            let text = match format {
+                Format::Text => format!("{name}:{at}:{column}: HINT {}\n", short(&line(&hint.text), 300)),
+                Format::Json => format!(
+                    "{}\n",
+                    json!({ "file": name, "message": number, "ok": true, "verdict": null, "code": "hint",
+                        "title": hint.text, "line": at, "column": column, "pointer": hint.pointer })
+                ),
+            };
+            super::print(&text)?;
+        }
+        Ok(())
     }
 }
 
@@ -185,7 +221,12 @@ fn too_large(length: u64, begin: Begin) -> Checked {
     )
 }
 
-fn message(text: &[u8], begin: Begin, arguments: &Validate, library: &Library) -> Checked {
+fn message(text: &[u8], begin: Begin, judging: &Judging<'_>) -> Checked {
+    let Judging {
+        arguments,
+        library,
+        hints,
+    } = judging;
     // A line ends with a line feed that is none of the message.
     let text = text.strip_suffix(b"\n").unwrap_or(text);
     let parsed = Parsed::of_bytes(text);
@@ -220,16 +261,21 @@ fn message(text: &[u8], begin: Begin, arguments: &Validate, library: &Library) -
         // What is not JSON is wrong on every topic.
         None if value.is_none() => "state",
         None if value.is_some_and(|value| value.get("topic").is_some() && value.get("payload").is_some()) => {
-            return own(
-                "a message with its topic, as recorders write it".to_owned(),
-                Some("judge recordings with `vda5050-tck audit`".to_owned()),
-            );
+            let hint = "judge recordings with `vda5050-tck audit`".to_owned();
+            let refused = own("a message with its topic, as recorders write it".to_owned(), Some(hint));
+            return Checked {
+                is_recorded: true,
+                ..refused
+            };
         }
         None => {
-            return own(
-                "JSON, but not a message that can be told by its members".to_owned(),
-                Some("say which with --topic".to_owned()),
-            );
+            let title = value.and_then(|value| wrapped(pack, value));
+            let hint = match &title {
+                Some(_) => "a message has its members at its top level, beside headerId",
+                None => "say which with --topic",
+            };
+            let title = title.unwrap_or_else(|| "JSON, but not a message that can be told by its members".to_owned());
+            return own(title, Some(hint.to_owned()));
         }
     };
     if pack.topic(topic).is_none() {
@@ -254,8 +300,18 @@ fn message(text: &[u8], begin: Begin, arguments: &Validate, library: &Library) -
             nearest,
         }
     });
+    let noted = value
+        .map(|value| hints.of_message(pack, topic, value))
+        .unwrap_or_default();
+    let noted = noted.into_iter().map(|hint| {
+        let at = place::of(text, &hint.pointer).map_or(0, |range| range.start);
+        let Begin { line, column } = begin.at(text, at);
+        Noted { hint, line, column }
+    });
     Checked {
         flaws: placed.collect(),
+        hints: noted.collect(),
+        is_recorded: false,
         what: format!("a valid {topic} message of VDA 5050 {}", pack.version),
     }
 }
@@ -366,6 +422,28 @@ pub fn topic_of(value: &Value) -> Option<&'static str> {
     .into_iter()
     .find(|(member, _)| has(member))
     .map(|(_, topic)| topic)
+}
+
+/// The member of something that is no message in which one lies, and which one.
+fn wrapped(pack: &Pack, value: &Value) -> Option<String> {
+    let inside = |value: &Value| -> Option<Value> {
+        match value {
+            Value::Object(_) => Some(value.clone()),
+            Value::Array(all) => all.first().filter(|first| first.is_object()).cloned(),
+            Value::String(text) => serde_json::from_str(text).ok().filter(Value::is_object),
+            _ => None,
+        }
+    };
+    value.as_object()?.iter().find_map(|(name, value)| {
+        let inner = inside(value)?;
+        let by_name = pack.topic(name).map(|rule| rule.name.as_str());
+        let topic = topic_of(&inner).or(by_name)?;
+        let how = if value.is_string() { ", as a text" } else { "" };
+        Some(format!(
+            "the members of the {topic} lie inside `{}`{how}",
+            short(&line(name), 60)
+        ))
+    })
 }
 
 fn unknown_topic(topic: &str, pack: &Pack) -> Diagnostic {

@@ -2,6 +2,7 @@
 
 pub mod args;
 mod audit;
+mod audited;
 mod browser;
 mod certify;
 mod device;

@@ -160,9 +160,14 @@ pub(super) struct Outputs<'a> {
 impl Outputs<'_> {
     /// Writes what came out of a run into every file.
     pub(super) fn write(&self, shown: &Shown<'_>) -> Result<(), String> {
+        self.write_each(|rendering| shown.as_text(rendering))
+    }
+
+    /// Writes into every file what this makes of its kind.
+    pub(super) fn write_each(&self, text: impl Fn(Rendering) -> Result<String, JunitError>) -> Result<(), String> {
         self.settled.set(true);
         for wanted in self.files {
-            write(wanted, shown.as_text(wanted.rendering))?;
+            write(wanted, text(wanted.rendering))?;
         }
         Ok(())
     }

@@ -8,6 +8,7 @@ use super::args::{Format, Report};
 use super::exit::Exit;
 use super::outputs::Outputs;
 use super::problem::Problem;
+use tck_audit::saved;
 use tck_base::diagnostic::Diagnostic;
 use tck_journal::file::{self, NAME, PACKED, Recording};
 use tck_judge as judge;
@@ -18,6 +19,9 @@ use tck_run::{Bundle, sources, write_all};
 /// `report`.
 pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem> {
     if let Some(folders) = &arguments.compare {
+        if !arguments.page && folders.iter().any(|folder| saved::is_audit(folder)) {
+            return super::audited::compare(folders, arguments.format);
+        }
         return compare_runs(arguments, folders);
     }
     let Some(folder) = &arguments.directory else {
@@ -25,6 +29,9 @@ pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem
     };
     if arguments.verify {
         return verify(folder, arguments);
+    }
+    if saved::is_audit(folder) {
+        return super::audited::report(folder, arguments, outputs);
     }
     if arguments.certificate {
         return super::papers::certificate(folder);
@@ -201,17 +208,25 @@ fn verify(folder: &Path, arguments: &Report) -> Result<Exit, Problem> {
     let found = manifest::Manifest::verify(folder)
         .map_err(|error| Problem::from(Diagnostic::whole("manifest", error.to_string())))?;
     let is_meant = arguments.root.as_ref().is_none_or(|root| *root == found.root);
-    let holds = found.holds() && is_meant;
+    let (recordings, recordings_hold) = if saved::is_audit(folder) {
+        super::audited::recordings(folder)?
+    } else {
+        (Vec::new(), true)
+    };
+    let holds = found.holds() && is_meant && recordings_hold;
     let text = match arguments.format {
         Format::Json => format!(
             "{}\n",
-            json!({ "intact": holds, "rootIsMeant": is_meant, "found": found })
+            json!({ "intact": holds, "rootIsMeant": is_meant, "found": found, "recordings": recordings })
         ),
-        Format::Text if is_meant => format!("{}\n", found.text().trim_end()),
-        Format::Text => format!(
-            "{}\nthe root hash is another one than --root says: this is not the bundle that was meant\n",
-            found.text().trim_end()
-        ),
+        Format::Text => {
+            let mut text = format!("{}\n", found.text().trim_end());
+            if !is_meant {
+                text.push_str("the root hash is another one than --root says: this is not the bundle that was meant\n");
+            }
+            text.extend(recordings.iter().map(super::audited::told));
+            text
+        }
     };
     super::print(&text)?;
     Ok(if holds { Exit::Conforms } else { Exit::DoesNotConform })

@@ -3,11 +3,12 @@
 use std::collections::VecDeque;
 
 use super::args::Audit as Arguments;
+use super::audit::{redacted, redactor};
 use super::exit::Exit;
 use super::problem::Problem;
 use super::recordings::{broken, in_time, open};
 use tck_audit::result::AuditResult;
-use tck_audit::slice::{Target, records, smallest, written};
+use tck_audit::slice::{Target, origin, records, smallest, written};
 use tck_audit::{Audit, Options};
 use tck_base::diagnostic::Diagnostic;
 use tck_capture::merge::Merged;
@@ -42,11 +43,13 @@ pub fn slice(
     let found = smallest(&library.rules, options, &target, &messages);
     let found = found.map_err(|error| refuse(error.to_string()))?;
     let Some(found) = found else {
-        return Err(refuse(format!(
+        let title = format!(
             "{} of {} cannot be shown by messages of the vehicle alone",
             target.requirement,
             target.vehicle()
-        )));
+        );
+        let hint = "what is found of a connection is shown by its packets: cut that connection out of the capture, and hand that on";
+        return Err(Diagnostic::whole("slice", title).hint(hint).into());
     };
     eprintln!(
         "{} messages of {} show {} ({})",
@@ -55,7 +58,8 @@ pub fn slice(
         target.requirement,
         target.monitor
     );
-    for record in records(found) {
+    let origin = origin(&target, &found, &result.recordings);
+    for record in records(found, origin) {
         let line = serde_json::to_string(&record).map_err(|error| Problem::Environment(error.to_string()))?;
         super::print(&format!("{line}\n"))?;
     }
@@ -69,6 +73,7 @@ fn of_vehicle(
     options: &Options,
     target: &Target,
 ) -> Result<VecDeque<Message>, Problem> {
+    let mut redactor = redactor(arguments, library, options)?;
     let options = Options {
         vehicles: vec![target.vehicle()],
         ..options.clone()
@@ -82,12 +87,15 @@ fn of_vehicle(
     let mut kept = VecDeque::new();
     let (mut number, mut behind) = (0, 0);
     while let Some(told) = merged.read().map_err(broken)? {
-        let Told::Message(message) = told else { continue };
-        if !in_time(message.at, arguments) {
+        if !in_time(told.at(), arguments) {
             continue;
         }
+        // The same names as before, since the same messages come in the same order.
+        let Some(Told::Message(message)) = redacted(told, &mut redactor) else {
+            continue;
+        };
         number += 1;
-        if names.address(&message.topic).is_none() {
+        if !names.concerns(&message.topic) {
             continue;
         }
         if kept.len() == BEFORE {

@@ -8,10 +8,12 @@ use serde::de::IgnoredAny;
 
 use super::args::{Format, Validate};
 use super::exit::Exit;
-use super::messages::{self, Counted};
+use super::messages::{self, Counted, Judging};
 use super::problem::Problem;
 use crate::ui::escaped;
+use tck_audit::Hints;
 use tck_base::diagnostic::{Diagnostic, Source};
+use tck_capture::input::no_plain_text;
 use tck_course::Layout;
 use tck_explore::Grammar;
 use tck_journal::place;
@@ -27,6 +29,8 @@ const WHOLE: usize = 32 << 20;
 /// What is wrong with a file, or what it is.
 enum Found {
     Good(String),
+    /// It is what it should be, and something in it looks wrong.
+    Doubtful(String, Vec<String>),
     Bad(Vec<Diagnostic>),
     /// It is wrong, and everything was said.
     Told,
@@ -35,13 +39,20 @@ enum Found {
 /// `validate`.
 pub fn validate(arguments: &Validate) -> Result<Exit, Problem> {
     let library = crate::assets::library(arguments.suites.own())?;
+    let judging = Judging {
+        arguments,
+        library: &library,
+        hints: Hints::of(&library.rules.packs),
+    };
     let mut wrong = 0;
     for path in &expanded(&arguments.files)? {
         let name = path.display().to_string();
         let (beginning, rest) = read(path)?;
-        let found = if let Some(form) = messages::form(path, &beginning) {
+        let found = if let Some(what) = no_plain_text(&beginning) {
+            Found::Bad(vec![Diagnostic::whole("not-text", format!("{name} is {what}"))])
+        } else if let Some(form) = messages::form(path, &beginning) {
             let all = BufReader::new(beginning.as_slice().chain(rest));
-            let counted = messages::batch(&name, all, form, arguments, &library)?;
+            let counted = messages::batch(&name, all, form, &judging)?;
             wrong += usize::from(counted.wrong > 0);
             summary(&name, counted, arguments.format)?;
             continue;
@@ -51,13 +62,23 @@ pub fn validate(arguments: &Validate) -> Result<Exit, Problem> {
             let hint = "many messages are read one a line, or as elements of one array";
             Found::Bad(vec![Diagnostic::whole("too-large", title).hint(hint)])
         } else {
-            check(&name, &beginning, path, arguments, &library)?
+            check(&name, &beginning, path, &judging)?
         };
         match (found, arguments.format) {
             (Found::Good(what), Format::Text) => super::print(&format!("{name}: {what}\n"))?,
             (Found::Good(what), Format::Json) => super::print(&format!(
                 "{}\n",
                 serde_json::json!({ "file": name, "ok": true, "what": what })
+            ))?,
+            (Found::Doubtful(what, doubts), Format::Text) => {
+                for doubt in doubts {
+                    super::print(&format!("{name}: WARN {doubt}\n"))?;
+                }
+                super::print(&format!("{name}: {what}\n"))?
+            }
+            (Found::Doubtful(what, doubts), Format::Json) => super::print(&format!(
+                "{}\n",
+                serde_json::json!({ "file": name, "ok": true, "what": what, "warnings": doubts })
             ))?,
             (Found::Told, _) => {
                 wrong += 1;
@@ -145,15 +166,17 @@ fn read(path: &Path) -> Result<(Vec<u8>, Box<dyn Read>), Problem> {
     Ok((beginning, input))
 }
 
-fn check(name: &str, bytes: &[u8], path: &Path, arguments: &Validate, library: &Library) -> Result<Found, Problem> {
+fn check(name: &str, bytes: &[u8], path: &Path, judging: &Judging<'_>) -> Result<Found, Problem> {
+    let library = judging.library;
     let json = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     if serde_json::from_slice::<IgnoredAny>(json).is_ok() {
         // A file of many bytes is told by its members, and not kept as a whole.
         let member = |name: &str| place::member(json, name);
-        if member("metaInformation").is_some() && member("layouts").is_some() {
+        if member("metaInformation").is_some() {
             // The text itself, so that a mistake is shown where it stands.
             return Ok(match layout(&Source::new(name, String::from_utf8_lossy(bytes))) {
-                Ok(what) => Found::Good(what),
+                Ok((what, doubts)) if doubts.is_empty() => Found::Good(what),
+                Ok((what, doubts)) => Found::Doubtful(what, doubts),
                 Err(all) => Found::Bad(all),
             });
         }
@@ -164,7 +187,7 @@ fn check(name: &str, bytes: &[u8], path: &Path, arguments: &Validate, library: &
                 Err(error) => Found::Bad(vec![Diagnostic::whole("result", error.to_string())]),
             });
         }
-        return one(name, bytes, arguments, library);
+        return one(name, bytes, judging);
     }
     let Ok(text) = std::str::from_utf8(bytes) else {
         return Ok(Found::Bad(vec![Diagnostic::whole(
@@ -189,7 +212,7 @@ fn check(name: &str, bytes: &[u8], path: &Path, arguments: &Validate, library: &
         );
     }
     if extension == "json" || text.trim_start().starts_with('{') {
-        return one(name, bytes, arguments, library);
+        return one(name, bytes, judging);
     }
     let checked = beside_tests(name, text, path, library).unwrap_or_else(|| library.check_suite(name, text));
     Ok(match checked {
@@ -231,8 +254,8 @@ fn looks_like_toml(text: &str) -> bool {
 }
 
 /// A file with one message.
-fn one(name: &str, bytes: &[u8], arguments: &Validate, library: &Library) -> Result<Found, Problem> {
-    let (counted, what) = messages::alone(name, bytes, arguments, library)?;
+fn one(name: &str, bytes: &[u8], judging: &Judging<'_>) -> Result<Found, Problem> {
+    let (counted, what) = messages::alone(name, bytes, judging)?;
     Ok(if counted.wrong > 0 {
         Found::Told
     } else {
@@ -240,16 +263,26 @@ fn one(name: &str, bytes: &[u8], arguments: &Validate, library: &Library) -> Res
     })
 }
 
-/// Reads a layout for each of its vehicle types: which one is meant is said by the profile that uses it.
-fn layout(source: &Arc<Source>) -> Result<String, Vec<Diagnostic>> {
-    let mut said = Vec::new();
-    let mut left_out = Vec::new();
+/// Reads a layout for each of its vehicle types: which one is meant is said by the profile that uses it. Gives what it is, and
+/// what looks wrong in it.
+fn layout(source: &Arc<Source>) -> Result<(String, Vec<String>), Vec<Diagnostic>> {
+    let (mut said, mut left_out, mut doubts, mut curves) = (Vec::new(), Vec::new(), Vec::new(), 0);
     for vehicle_type in Layout::vehicle_types(source)? {
         let layout = Layout::from_lif(source, Some(&vehicle_type))?;
         let (nodes, edges) = (layout.nodes().count(), layout.edges().count());
         said.push(format!("{nodes} nodes and {edges} edges for {vehicle_type}"));
         let unused = layout.left_out().iter();
         left_out.extend(unused.map(|sentence| format!("\n  not used for {vehicle_type}: {}", escaped(sentence))));
+        curves += layout.curves();
+        for doubt in layout.doubts() {
+            if !doubts.contains(&doubt) {
+                doubts.push(doubt);
+            }
+        }
     }
-    Ok(format!("a layout with {}{}", said.join(", "), left_out.concat()))
+    let mut what = format!("a layout with {}{}", said.join(", "), left_out.concat());
+    if curves > 0 {
+        what.push_str("; a run sends no curve of a layout");
+    }
+    Ok((what, doubts))
 }

@@ -15,6 +15,7 @@ mod discovering;
 mod exit_codes;
 mod exploring;
 mod following;
+mod handed_over;
 mod hooks;
 mod hostile;
 mod https;

@@ -4,7 +4,7 @@ use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
-use super::result::{AuditResult, Recording, verdict_of};
+use super::result::{AuditResult, Recording};
 use super::{Address, Audit, AuditError, Options};
 use tck_capture::{Message, Told, Wire, WireEvent};
 use tck_journal::event::Packet;
@@ -98,7 +98,7 @@ impl Crew<'_> {
         desk.first = desk.first.or(message.at);
         desk.last = message.at.or(desk.last);
         let Some(address) = desk.address(&message.topic) else {
-            desk.elsewhere += 1;
+            desk.stray(desk.messages, &message);
             return;
         };
         let number = desk.messages;
@@ -141,8 +141,9 @@ pub fn judged<E: From<AuditError>>(
         for hand in &mut crew.hands {
             hand.pass();
         }
-        let Crew { desk, hands } = crew;
+        let Crew { mut desk, hands } = crew;
         drop(hands);
+        let misnamed = std::mem::take(&mut desk.misnamed);
         let mut result = desk.finish(Vec::new());
         for hand in working {
             match hand.join() {
@@ -157,7 +158,8 @@ pub fn judged<E: From<AuditError>>(
         result.recordings = recordings?;
         // The versions of a vehicle stay in their order.
         result.vehicles.sort_by(|one, other| one.topics.cmp(&other.topics));
-        result.verdict = verdict_of(&result.vehicles);
+        misnamed.tell(&mut result, rules, options);
+        result.conclude();
         Ok(result)
     })
 }

@@ -16,11 +16,15 @@ mod conversation;
 pub mod crew;
 pub mod export;
 mod header;
+mod hint;
+mod misnamed;
 mod news;
 mod outcome;
 mod own_run;
 pub mod page;
+mod redact;
 pub mod result;
+pub mod saved;
 mod side;
 mod single;
 pub mod slice;
@@ -30,17 +34,21 @@ mod vehicle;
 mod wires;
 
 use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
 use tck_capture::{Message, Place, Told, Wire, WireEvent};
 use tck_journal::event::Packet;
 use tck_judge::Rules;
 use tck_suite::model::Monitor;
 
+pub use hint::{Hint, Hints};
+use misnamed::Misnamed;
 pub use news::{Address, Found};
 pub use own_run::{OwnRunError, own_run};
+pub use redact::Redactor;
 use result::{AuditResult, RESULT_FORMAT, Recording, Whence};
 pub use single::{Flaw, single};
-use topics::{Named, Topics};
+use topics::{Beside, Named, Topics};
 use vehicle::Vehicle;
 use wires::{Publisher, Wires};
 
@@ -116,6 +124,8 @@ struct Scene<'a> {
     rules: &'a Rules,
     options: &'a Options,
     places: &'a Whence,
+    /// Names to compare those in messages with, once one is looked at.
+    hints: &'a OnceLock<Hints>,
     /// Whether each finding is told at once.
     live: bool,
 }
@@ -131,6 +141,8 @@ pub struct Audit<'r> {
     elsewhere: u64,
     beyond: u64,
     places: Whence,
+    hints: OnceLock<Hints>,
+    misnamed: Misnamed,
     live: bool,
     news: Vec<Found>,
     first: Option<jiff::Timestamp>,
@@ -174,6 +186,8 @@ impl<'r> Audit<'r> {
             elsewhere: 0,
             beyond: 0,
             places: Whence::default(),
+            hints: OnceLock::new(),
+            misnamed: Misnamed::default(),
             live: false,
             news: Vec::new(),
             first: None,
@@ -226,7 +240,7 @@ impl<'r> Audit<'r> {
         self.first = self.first.or(message.at);
         self.last = message.at.or(self.last);
         let Some(named) = self.topics.read(&message.topic) else {
-            self.elsewhere += 1;
+            self.stray(number, &message);
             return;
         };
         if !self.options.wants_vehicle(&named.manufacturer, &named.serial_number) {
@@ -248,6 +262,7 @@ impl<'r> Audit<'r> {
                 rules: self.rules,
                 options: &self.options,
                 places: &self.places,
+                hints: &self.hints,
                 live: self.live,
             };
             let carried = message.carried;
@@ -258,6 +273,25 @@ impl<'r> Audit<'r> {
             if self.live {
                 self.news.append(&mut vehicle.news());
             }
+        }
+    }
+
+    /// Whether a topic is of a vehicle that is wanted, or meant to be.
+    #[must_use]
+    pub fn concerns(&self, topic: &str) -> bool {
+        let beside = || {
+            let beside = self.topics.beside(topic)?;
+            Some(self.options.wants_vehicle(&beside.manufacturer, &beside.serial_number))
+        };
+        self.address(topic).is_some() || beside().unwrap_or_default()
+    }
+
+    /// A message on a topic of no vehicle.
+    fn stray(&mut self, number: u64, message: &Message) {
+        self.elsewhere += 1;
+        let wanted = |beside: &Beside| self.options.wants_vehicle(&beside.manufacturer, &beside.serial_number);
+        if let Some(beside) = self.topics.beside(&message.topic).filter(wanted) {
+            self.misnamed.note(number, beside, message);
         }
     }
 
@@ -294,6 +328,7 @@ impl<'r> Audit<'r> {
             rules: self.rules,
             options: &self.options,
             places: &self.places,
+            hints: &self.hints,
             live: self.live,
         };
         let missing = self.wires.take(wire, number, publisher, &mut self.vehicles, scene);
@@ -315,6 +350,7 @@ impl<'r> Audit<'r> {
             rules: self.rules,
             options: &self.options,
             places: &self.places,
+            hints: &self.hints,
             live: self.live,
         };
         for vehicle in self.vehicles.values_mut() {
@@ -332,6 +368,7 @@ impl<'r> Audit<'r> {
             rules: self.rules,
             options: &self.options,
             places: &self.places,
+            hints: &self.hints,
             live: false,
         };
         for vehicle in self.vehicles.values_mut() {
@@ -343,21 +380,27 @@ impl<'r> Audit<'r> {
             .into_values()
             .flat_map(|vehicle| vehicle.finish(scene))
             .collect();
-        AuditResult {
+        let mut result = AuditResult {
             format: RESULT_FORMAT.to_owned(),
             tool: tck_journal::tool(),
-            verdict: result::verdict_of(&vehicles),
+            verdict: None,
             recordings,
             messages: self.messages,
             first: self.first.map(|at| format!("{at:.3}")),
             last: self.last.map(|at| format!("{at:.3}")),
             elsewhere: self.elsewhere,
             beyond: self.beyond,
+            master_control: None,
             vehicles,
-        }
+        };
+        self.misnamed.tell(&mut result, self.rules, &self.options);
+        result.conclude();
+        result
     }
 }
 
+#[cfg(test)]
+mod result_tests;
 #[cfg(test)]
 mod site_tests;
 #[cfg(test)]

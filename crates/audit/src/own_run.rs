@@ -80,6 +80,7 @@ pub fn own_run(
         twice: 0,
         retained: 0,
         vantage: header.vantage,
+        hints: Vec::new(),
         time_line: TimeLine::default(),
         sides: vec![side],
     })
@@ -115,6 +116,7 @@ fn keep(
         first: at.clone(),
         last: at.clone(),
         text: finding.message,
+        shown: None,
         interpretation: finding.interpretation,
     });
     known.count += finding.count;

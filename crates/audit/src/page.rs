@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::result::{AuditResult, FindingResult, SideResult, Stretch, VehicleResult, Whereabouts};
+use super::result::{AuditResult, Mistake, SideResult, Stretch, VehicleResult, Whereabouts, Whole, WholeDecided};
 use tck_base::verdict::Verdict;
 use tck_report::clean::{line, short};
 use tck_report::statement::many;
@@ -40,6 +40,9 @@ pub fn page(result: &AuditResult) -> String {
     for vehicle in &result.vehicles {
         text.push_str(&of_vehicle(vehicle, result));
     }
+    if let Some(whole) = &result.master_control {
+        text.push_str(&of_whole(whole));
+    }
     text.push('\n');
     if result.elsewhere > 0 {
         let _ = writeln!(
@@ -59,12 +62,34 @@ pub fn page(result: &AuditResult) -> String {
     text
 }
 
+/// The master control over all vehicles.
+fn of_whole(whole: &Whole) -> String {
+    let kept = |known: &&WholeDecided| known.verdict == Verdict::Pass;
+    let hold = whole.requirements.iter().filter(kept).count();
+    let mut text = format!(
+        "\n{}the master control of {}, {}: {} kept",
+        tag(whole.verdict),
+        many(whole.vehicles, "vehicle"),
+        counted(whole.messages, "message"),
+        many(hold, "requirement")
+    );
+    if hold < whole.requirements.len() {
+        let _ = write!(text, ", {} not", whole.requirements.len() - hold);
+    }
+    text.push('\n');
+    for known in whole.requirements.iter().filter(|known| !kept(known)) {
+        let tag = tag(Some(known.verdict));
+        let _ = writeln!(text, "      {tag}{} with {}", known.id, many(known.vehicles, "vehicle"));
+    }
+    text
+}
+
 fn conclusion(result: &AuditResult) -> String {
     let sides = || result.vehicles.iter().flat_map(|vehicle| &vehicle.sides);
     let kinds = |verdict: Verdict| {
         sides()
-            .flat_map(|side| &side.findings)
-            .filter(|finding| finding.verdict == verdict)
+            .flat_map(SideResult::mistakes)
+            .filter(|mistake| mistake.worst.verdict == verdict)
             .count()
     };
     let vehicles = many(result.vehicles.len(), "vehicle");
@@ -122,6 +147,18 @@ fn of_vehicle(vehicle: &VehicleResult, result: &AuditResult) -> String {
     for side in &vehicle.sides {
         text.push_str(&of_side(side, result));
     }
+    for hint in &vehicle.hints {
+        let first = &hint.first;
+        let place = placed(result, first.recording, first.line, first.message);
+        let _ = writeln!(
+            text,
+            "hint  {}, {}: {place}, {}",
+            line(&hint.topic),
+            times(hint.count),
+            first.at
+        );
+        let _ = writeln!(text, "            {}", short(&line(&hint.text), 400));
+    }
     text
 }
 
@@ -148,8 +185,8 @@ fn of_side(side: &SideResult, result: &AuditResult) -> String {
     }
     text.push('\n');
     text.push_str(&not_compared(side, result));
-    for finding in &side.findings {
-        text.push_str(&of_finding(finding, result));
+    for mistake in side.mistakes() {
+        text.push_str(&of_mistake(&mistake, result));
     }
     for known in &side.information {
         let _ = writeln!(
@@ -204,17 +241,18 @@ fn placed(result: &AuditResult, recording: Option<usize>, at: Option<u64>, messa
     }
 }
 
-fn of_finding(finding: &FindingResult, result: &AuditResult) -> String {
-    let place = placed(result, finding.recording, finding.line, finding.message);
+fn of_mistake(mistake: &Mistake<'_>, result: &AuditResult) -> String {
+    let worst = mistake.worst;
+    let place = placed(result, worst.recording, worst.line, worst.message);
     let mut text = format!(
         "      {}{} {}, {}: {place}, {}\n",
-        tag(Some(finding.verdict)),
-        finding.requirement,
-        finding.monitor,
-        times(finding.count),
-        finding.first
+        tag(Some(worst.verdict)),
+        mistake.requirements.join(", "),
+        worst.monitor,
+        times(mistake.count),
+        worst.first
     );
-    let _ = writeln!(text, "            {}", short(&line(&finding.text), 400));
+    let _ = writeln!(text, "            {}", short(&line(&worst.text), 400));
     text
 }
 

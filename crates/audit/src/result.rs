@@ -1,13 +1,16 @@
 //! What an audit found, for programs.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::path::Path;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
+use super::cause;
 use super::time_line::TimeLine;
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_capture::{Counted, Place};
 use tck_pack::Role;
+use tck_report::manifest::digest;
 
 /// Format of the result of an audit.
 pub const RESULT_FORMAT: &str = "vda5050-tck.audit/1";
@@ -15,7 +18,7 @@ pub const RESULT_FORMAT: &str = "vda5050-tck.audit/1";
 const PLACES: usize = 16_384;
 
 /// The result.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct AuditResult {
     /// [`RESULT_FORMAT`].
@@ -36,27 +39,62 @@ pub struct AuditResult {
     pub elsewhere: u64,
     /// Messages of vehicles beyond those that are judged at once.
     pub beyond: u64,
+    /// The master control as a whole, where more than one vehicle heard of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub master_control: Option<Whole>,
     /// The vehicles.
     pub vehicles: Vec<VehicleResult>,
 }
 
+/// The master control over all vehicles that it commands.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Whole {
+    /// The worst of all vehicles.
+    pub verdict: Option<Verdict>,
+    /// How many vehicles it commands.
+    pub vehicles: usize,
+    /// Its messages.
+    pub messages: u64,
+    /// What was decided, the worst first.
+    pub requirements: Vec<WholeDecided>,
+}
+
+/// A requirement of the master control over all vehicles.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct WholeDecided {
+    /// Its id.
+    pub id: String,
+    /// The worst of all vehicles.
+    pub verdict: Verdict,
+    /// With how many vehicles it stands so.
+    pub vehicles: usize,
+}
+
 /// One recording.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Recording {
     /// Its name.
     pub name: String,
     /// What it consists of: `line`, or `frame` of captured traffic.
     pub unit: String,
+    /// Its length in bytes, as it lies there; unknown of standard input.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bytes: Option<u64>,
+    /// Its SHA-256 in hexadecimal.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sha256: Option<String>,
     /// Lines in all.
     pub lines: u64,
     /// Lines that hold no message.
     pub skipped: u64,
     /// Frames of connections that are encrypted, and were not read.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub encrypted: u64,
     /// Frames of connections that speak WebSocket, and were not read.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub web_socket: u64,
 }
 
@@ -67,11 +105,24 @@ impl Recording {
         Self {
             name,
             unit: unit.to_owned(),
+            bytes: None,
+            sha256: None,
             lines: counted.lines,
             skipped: counted.skipped,
             encrypted: counted.encrypted,
             web_socket: counted.web_socket,
         }
+    }
+
+    /// Takes the fingerprint of the file of that name, where it is one.
+    #[must_use]
+    pub fn hashed(mut self) -> Self {
+        let path = Path::new(&self.name);
+        if let Some((bytes, sha256)) = path.is_file().then(|| digest(path).ok()).flatten() {
+            self.bytes = Some(bytes);
+            self.sha256 = Some(sha256);
+        }
+        self
     }
 }
 
@@ -81,7 +132,7 @@ fn is_zero(count: &u64) -> bool {
 }
 
 /// One vehicle, with the master control that commands it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct VehicleResult {
     /// Manufacturer.
@@ -93,7 +144,7 @@ pub struct VehicleResult {
     /// Protocol version it is judged by.
     pub protocol: Option<String>,
     /// Why it is not judged.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub not_judged: Option<String>,
     /// Messages by topic name.
     pub messages: BTreeMap<String, u64>,
@@ -105,15 +156,18 @@ pub struct VehicleResult {
     pub retained: u64,
     /// `subscriber`, or `tap` where packets were recorded.
     pub vantage: String,
+    /// What is allowed in its messages and in those to it, and looks like a slip.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub hints: Vec<HintResult>,
     /// What it did over time.
-    #[serde(skip_serializing_if = "TimeLine::is_empty")]
+    #[serde(default, skip_serializing_if = "TimeLine::is_empty")]
     pub time_line: TimeLine,
     /// Its sides.
     pub sides: Vec<SideResult>,
 }
 
 /// One side.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct SideResult {
     /// `agv` or `master-control`.
@@ -133,19 +187,19 @@ pub struct SideResult {
     /// The monitors that could not judge.
     pub undecided: Vec<Undecided>,
     /// Why nothing is said of this side, though messages of it came.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub not_judged: Option<String>,
     /// Live messages of this side that were held against those before them.
     pub compared: u64,
     /// Those that were not.
     pub not_compared: u64,
     /// Where those stand, as far as they are kept.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stretches: Vec<Stretch>,
 }
 
 /// Messages that come one after the other and were not held against those before them.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Stretch {
     /// How many of this side.
@@ -159,23 +213,23 @@ pub struct Stretch {
 }
 
 /// Where a message stands, and when it came.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Whereabouts {
     /// Its number, counted from 1.
     pub message: u64,
     /// Number of its recording, counted from 0.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording: Option<usize>,
     /// Its line.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub line: Option<u64>,
     /// When it came.
     pub at: String,
 }
 
 /// What a monitor found, with all of its kind.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct FindingResult {
     /// Id of the monitor.
@@ -189,10 +243,10 @@ pub struct FindingResult {
     /// Number of the first message that shows it, counted from 1.
     pub message: u64,
     /// Number of its recording, counted from 0.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording: Option<usize>,
     /// Its line.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub line: Option<u64>,
     /// When it was found first.
     pub first: String,
@@ -200,13 +254,44 @@ pub struct FindingResult {
     pub last: String,
     /// What is wrong, of the first one.
     pub text: String,
+    /// The first message that shows it, as far as it is kept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shown: Option<String>,
     /// The ruling it rests on.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interpretation: Option<String>,
 }
 
+/// Something that is allowed and looks like a slip, with all of its kind.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct HintResult {
+    /// Topic name of the messages.
+    pub topic: String,
+    /// Where it stands in the first one, as a JSON pointer.
+    pub pointer: String,
+    /// One line.
+    pub text: String,
+    /// How often.
+    pub count: u64,
+    /// The first message with it.
+    #[serde(flatten)]
+    pub first: Whereabouts,
+}
+
+/// One mistake: every requirement that it breaks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mistake<'r> {
+    /// The requirements.
+    pub requirements: Vec<&'r str>,
+    /// The worst of what was found of it.
+    pub worst: &'r FindingResult,
+    /// How often.
+    pub count: u64,
+}
+
 /// A requirement that was decided.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Decided {
     /// Its id.
@@ -218,7 +303,7 @@ pub struct Decided {
 }
 
 /// A monitor that could not judge.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Undecided {
     /// Its id.
@@ -282,6 +367,33 @@ impl SideResult {
         }
     }
 
+    /// What is wrong, mistake by mistake: what is found at one place of one message is one, whatever it breaks.
+    #[must_use]
+    pub fn mistakes(&self) -> Vec<Mistake<'_>> {
+        let mut all: Vec<Mistake<'_>> = Vec::new();
+        for finding in &self.findings {
+            let about = |finding: &FindingResult| (finding.message, cause::place(&finding.text).to_owned());
+            match all.iter_mut().find(|known| about(known.worst) == about(finding)) {
+                Some(known) => {
+                    let is_more = finding.verdict == known.worst.verdict && finding.text.len() > known.worst.text.len();
+                    if is_more {
+                        known.worst = finding;
+                    }
+                    if !known.requirements.contains(&finding.requirement.as_str()) {
+                        known.requirements.push(&finding.requirement);
+                    }
+                    known.count = known.count.max(finding.count);
+                }
+                None => all.push(Mistake {
+                    requirements: vec![&finding.requirement],
+                    worst: finding,
+                    count: finding.count,
+                }),
+            }
+        }
+        all
+    }
+
     /// Takes back that something is kept where too little was seen; what is wrong is wrong.
     #[must_use]
     pub fn unless(mut self, why: Option<&str>) -> Self {
@@ -305,12 +417,65 @@ impl AuditResult {
             return;
         };
         side.add(finding);
-        self.verdict = verdict_of(&self.vehicles);
+        self.conclude();
     }
+
+    /// Puts together what was found of the vehicles.
+    pub fn conclude(&mut self) {
+        self.verdict = verdict_of(&self.vehicles);
+        self.master_control = whole(&self.vehicles);
+    }
+}
+
+/// What was found of the master control of all vehicles; `None` when it commands fewer than two.
+pub(super) fn whole(vehicles: &[VehicleResult]) -> Option<Whole> {
+    let sides = vehicles.iter().flat_map(|vehicle| &vehicle.sides);
+    let sides: Vec<&SideResult> = sides.filter(|side| side.role == Role::MasterControl.word()).collect();
+    let commanded: BTreeSet<(&str, &str)> = vehicles
+        .iter()
+        .filter(|vehicle| vehicle.sides.iter().any(|side| side.role == Role::MasterControl.word()))
+        .map(|vehicle| (vehicle.manufacturer.as_str(), vehicle.serial_number.as_str()))
+        .collect();
+    if commanded.len() < 2 {
+        return None;
+    }
+    let mut decided: BTreeMap<&str, Vec<Verdict>> = BTreeMap::new();
+    for known in sides.iter().flat_map(|side| &side.requirements) {
+        decided.entry(&known.id).or_default().push(known.verdict);
+    }
+    let requirements = decided.into_iter().filter_map(|(id, all)| {
+        let worst = all.iter().copied().collect::<Accumulated>().get()?;
+        Some(WholeDecided {
+            id: id.to_owned(),
+            verdict: worst,
+            vehicles: all.iter().filter(|verdict| **verdict == worst).count(),
+        })
+    });
+    let mut requirements: Vec<WholeDecided> = requirements.collect();
+    requirements.sort_by_key(|known| (std::cmp::Reverse(known.verdict), std::cmp::Reverse(known.vehicles)));
+    Some(Whole {
+        verdict: sides
+            .iter()
+            .filter_map(|side| side.verdict)
+            .collect::<Accumulated>()
+            .get(),
+        vehicles: commanded.len(),
+        messages: sides.iter().map(|side| side.messages).sum(),
+        requirements,
+    })
 }
 
 impl SideResult {
     fn add(&mut self, finding: FindingResult) {
+        self.put(finding, |_, _| true);
+    }
+
+    /// Takes in a finding; one that says something else is another one.
+    pub(super) fn add_apart(&mut self, finding: FindingResult) {
+        self.put(finding, |known, new| known.text == new.text);
+    }
+
+    fn put(&mut self, finding: FindingResult, is_alike: impl Fn(&FindingResult, &FindingResult) -> bool) {
         let verdict = finding.verdict;
         self.verdict = Some(self.verdict.map_or(verdict, |known| known.join(verdict)));
         match self.requirements.iter_mut().find(|one| one.id == finding.requirement) {
@@ -328,6 +493,7 @@ impl SideResult {
         }
         let is_same = |known: &&mut FindingResult| {
             (&known.monitor, &known.requirement, known.verdict) == (&finding.monitor, &finding.requirement, verdict)
+                && is_alike(known, &finding)
         };
         match self.findings.iter_mut().find(is_same) {
             Some(known) => {
@@ -343,8 +509,7 @@ impl SideResult {
 }
 
 /// The worst verdict of all sides.
-#[must_use]
-pub fn verdict_of(vehicles: &[VehicleResult]) -> Option<Verdict> {
+fn verdict_of(vehicles: &[VehicleResult]) -> Option<Verdict> {
     let sides = vehicles.iter().flat_map(|vehicle| &vehicle.sides);
     sides.filter_map(|side| side.verdict).collect::<Accumulated>().get()
 }

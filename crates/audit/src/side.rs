@@ -14,11 +14,15 @@ use tck_journal::Entry;
 use tck_journal::event::{Event, Record, RunHeader, Source};
 use tck_judge::{Observed, SideJudge};
 use tck_pack::{Pack, Role};
+use tck_report::clean::short;
 use tck_result::MonitorFinding;
 use tck_suite::model::{Monitor, Recordings};
 
 /// How many findings wait for their confirmation.
 const OPEN: usize = 256;
+/// How many messages of a side are kept to be shown, and how many characters of each.
+const SHOWN: usize = 32;
+const LENGTH: usize = 4_000;
 /// How many different findings a side keeps.
 const DIFFERENT: usize = 512;
 
@@ -78,7 +82,9 @@ pub(super) struct Side {
     unbroken: Option<SideJudge>,
     kept: BTreeMap<Key, FindingResult>,
     /// What holds only if nothing turns out to be missing: since when, and what.
-    open: VecDeque<(Moment, Observed, jiff::Timestamp)>,
+    open: VecDeque<(Moment, Observed, jiff::Timestamp, Arc<Entry>)>,
+    /// How many messages are kept to be shown.
+    shown: usize,
     judged: BTreeMap<String, u64>,
     decided: BTreeSet<(String, String)>,
     pub messages: u64,
@@ -109,6 +115,7 @@ impl Side {
             unbroken: None,
             kept: BTreeMap::new(),
             open: VecDeque::new(),
+            shown: 0,
             judged: BTreeMap::new(),
             decided: BTreeSet::new(),
             messages: 0,
@@ -195,15 +202,15 @@ impl Side {
 
     /// Nothing was missing up to here.
     pub fn confirmed(&mut self, scene: Scene<'_>) {
-        while let Some((_, observed, utc)) = self.open.pop_front() {
-            self.keep(observed, utc, scene);
+        while let Some((_, observed, utc, entry)) = self.open.pop_front() {
+            self.keep(observed, utc, Some(&entry), scene);
         }
     }
 
     /// Shows it a message.
     pub fn observe(&mut self, entry: &Arc<Entry>, utc: jiff::Timestamp, scene: Scene<'_>) {
         for observed in self.each.observe(entry) {
-            self.keep(observed, utc, scene);
+            self.keep(observed, utc, Some(entry), scene);
         }
         let found = self
             .unbroken
@@ -214,11 +221,13 @@ impl Side {
             if self.open.len() == OPEN {
                 self.open.pop_front();
             }
-            self.open.push_back((entry.at().moment, observed, utc));
+            self.open
+                .push_back((entry.at().moment, observed, utc, Arc::clone(entry)));
         }
     }
 
-    fn keep(&mut self, observed: Observed, utc: jiff::Timestamp, scene: Scene<'_>) {
+    /// Counts a finding, made at this entry.
+    fn keep(&mut self, observed: Observed, utc: jiff::Timestamp, entry: Option<&Arc<Entry>>, scene: Scene<'_>) {
         let Observed { monitor, finding } = observed;
         let key = self.key(&monitor, &finding);
         let last = format!("{utc:.3}");
@@ -260,9 +269,21 @@ impl Side {
             first: last.clone(),
             last,
             text: finding.message,
+            shown: self.show(message, entry),
             interpretation: finding.interpretation,
         };
         self.kept.insert(key, finding);
+    }
+
+    /// The message of that number, where it is the one at which something was found.
+    fn show(&mut self, message: u64, entry: Option<&Arc<Entry>>) -> Option<String> {
+        let json = entry.filter(|entry| entry.seq() == message)?.json()?;
+        if self.shown >= SHOWN {
+            return None;
+        }
+        self.shown += 1;
+        let text = serde_json::to_string_pretty(json).ok()?;
+        Some(short(&text, LENGTH).into_owned())
     }
 
     /// Takes over what was found of its connections.
@@ -272,7 +293,7 @@ impl Side {
         }
         self.decided.extend(outcome.decided);
         for (observed, utc) in outcome.found {
-            self.keep(observed, utc, scene);
+            self.keep(observed, utc, None, scene);
         }
     }
 

@@ -2,6 +2,7 @@
 
 use bytes::Bytes;
 
+use super::cause;
 use super::header::header;
 use tck_base::clock::{Moment, Stamp};
 use tck_base::verdict::Verdict;
@@ -74,11 +75,21 @@ pub fn single(rules: &Rules, pack: &Pack, name: &str, payload: &Bytes) -> Vec<Fl
         if !matches!(finding.verdict, Verdict::Fail | Verdict::Warning) {
             continue;
         }
-        let same = flaws.iter_mut().find(|flaw| {
-            flaw.verdict == finding.verdict && flaw.text == finding.message && flaw.monitor == observed.monitor
-        });
-        match same {
-            Some(flaw) => flaw.requirements.push(finding.requirement),
+        let place = cause::place(&finding.message);
+        match flaws.iter_mut().find(|flaw| cause::place(&flaw.text) == place) {
+            // One mistake breaks several requirements, and the worst of it is said.
+            Some(flaw) => {
+                let is_more = finding.message.len() > flaw.text.len();
+                if finding.verdict > flaw.verdict || (finding.verdict == flaw.verdict && is_more) {
+                    flaw.verdict = finding.verdict;
+                    flaw.text = finding.message;
+                    flaw.monitor = observed.monitor;
+                    flaw.interpretation = finding.interpretation;
+                }
+                if !flaw.requirements.contains(&finding.requirement) {
+                    flaw.requirements.push(finding.requirement);
+                }
+            }
             None => flaws.push(Flaw {
                 requirements: vec![finding.requirement],
                 verdict: finding.verdict,
@@ -165,6 +176,127 @@ mod tests {
             }
         }
         assert!(seen > 10);
+    }
+
+    /// Every member of a message, as a JSON pointer.
+    fn members(value: &Value, pointer: &str, all: &mut Vec<String>) {
+        match value {
+            Value::Object(object) => {
+                for (name, inner) in object {
+                    let inside = format!("{pointer}/{name}");
+                    members(inner, &inside, all);
+                    all.push(inside);
+                }
+            }
+            Value::Array(list) => {
+                for (at, inner) in list.iter().enumerate().take(1) {
+                    members(inner, &format!("{pointer}/{at}"), all);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// What other members are held against: without it, more is wrong than itself.
+    const HELD_AGAINST: [&str; 10] = [
+        "/trajectory",
+        "/actionParameters",
+        "/errorReferences",
+        "/maxArrayLens",
+        "/maps",
+        "/nodeStates",
+        "/edgeStates",
+        "/nodes",
+        "/edges",
+        "/actions",
+    ];
+
+    #[test]
+    fn one_mistake_is_one_finding() {
+        let library = tck_testing::library();
+        let pack = library.rules.packs.latest();
+        let mut found = 0;
+        for (topic, name) in [
+            ("state", "state-driving"),
+            ("order", "order-full"),
+            ("instantActions", "instantActions-several"),
+            ("connection", "connection-online"),
+            ("factsheet", "factsheet-full"),
+            ("visualization", "visualization-full"),
+        ] {
+            let whole: Value = serde_json::from_str(&good(name)).expect("JSON");
+            let mut pointers = Vec::new();
+            members(&whole, "", &mut pointers);
+            let is_held_against = |pointer: &String| {
+                let ends = |part: &&str| pointer.ends_with(*part) || pointer.contains(&format!("{part}/"));
+                HELD_AGAINST[..5].iter().any(ends) || HELD_AGAINST[5..].iter().any(|part| pointer == part)
+            };
+            pointers.retain(|pointer| !is_held_against(pointer));
+            for pointer in pointers {
+                let (holder, member) = pointer.rsplit_once('/').expect("a member");
+                let mut without = whole.clone();
+                let inside = without.pointer_mut(holder).and_then(Value::as_object_mut);
+                inside.expect("an object").shift_remove(member);
+                let mut odd = whole.clone();
+                if let Some(value) = odd.pointer_mut(&pointer) {
+                    *value = if value.is_object() {
+                        Value::from(7)
+                    } else {
+                        serde_json::json!({ "odd": 7 })
+                    };
+                }
+                for broken in [without, odd] {
+                    let text = Bytes::from(broken.to_string());
+                    let flaws = single(&library.rules, pack, topic, &text);
+                    let fails: Vec<&Flaw> = flaws.iter().filter(|flaw| flaw.verdict == Verdict::Fail).collect();
+                    assert!(fails.len() < 2, "{topic}{pointer}: {fails:#?}");
+                    found += fails.len();
+                }
+            }
+        }
+        assert!(found > 200, "{found}");
+    }
+
+    #[test]
+    fn everything_that_is_missing_is_named() {
+        let whole: Value = serde_json::from_str(&good("state-idle")).expect("JSON");
+        let library = tck_testing::library();
+        let names = [
+            "version",
+            "manufacturer",
+            "orderUpdateId",
+            "nodeStates",
+            "edgeStates",
+            "safetyState",
+        ];
+        let mut state = whole;
+        for name in names {
+            state.as_object_mut().expect("object").shift_remove(name);
+        }
+        let text = Bytes::from(state.to_string());
+        let flaws = single(&library.rules, library.rules.packs.latest(), "state", &text);
+        for name in names {
+            let text = format!("state/{name}: `{name}` is missing");
+            assert_eq!(
+                flaws.iter().filter(|flaw| flaw.text == text).count(),
+                1,
+                "{name}: {flaws:#?}"
+            );
+        }
+        // However much is wrong, nothing that is broken goes without a word.
+        let mut order: Value = serde_json::from_str(&good("order-full")).expect("JSON");
+        order["nodes"] = (0..200).map(|_| serde_json::json!({})).collect();
+        order["orderId"] = 7.into();
+        let text = Bytes::from(order.to_string());
+        let flaws = single(&library.rules, library.rules.packs.latest(), "order", &text);
+        assert!(
+            flaws.iter().any(|flaw| flaw.text.starts_with("order/nodes/")),
+            "{flaws:#?}"
+        );
+        assert!(
+            flaws.iter().any(|flaw| flaw.text.starts_with("order/orderId: 7")),
+            "{flaws:#?}"
+        );
     }
 
     #[test]

@@ -3,19 +3,22 @@
 //! The messages before the finding are taken back as far as needed, and then left out one after the other as long as the
 //! finding stays.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
+
+use serde_json::{Value, json};
 
 use super::{Audit, AuditError, Options};
 use tck_base::clock::{Moment, Stamp};
 use tck_base::verdict::Verdict;
-use tck_capture::{Message, Place};
+use tck_capture::Message;
 use tck_journal::Payload;
 use tck_journal::event::{Event, Record, RunHeader, Source};
 use tck_judge::Rules;
 use tck_view::{MessageView, Names, Topic};
 
 use super::arrived::timestamp;
-use super::result::AuditResult;
+use super::result::{AuditResult, Recording};
 
 /// How often messages are judged again at most, counted in messages.
 const EFFORT: usize = 2_000_000;
@@ -152,14 +155,35 @@ pub fn written(message: Message) -> Message {
         at: message.at.or_else(said).or(Some(jiff::Timestamp::UNIX_EPOCH)),
         qos: message.qos.or(Some(0)),
         retain: message.retain.or(Some(false)),
-        place: Place::default(),
         carried: None,
         ..message
     }
 }
 
-/// The records of a journal with these messages.
-pub fn records(messages: Vec<Message>) -> impl Iterator<Item = Record> {
+/// What a slice is a part of, and what it shows: which lines of which recordings, with their hashes.
+#[must_use]
+pub fn origin(target: &Target, messages: &[Message], recordings: &[Recording]) -> Value {
+    let mut lines: BTreeMap<usize, Vec<u64>> = BTreeMap::new();
+    for message in messages {
+        lines.entry(message.place.file).or_default().push(message.place.line);
+    }
+    let recordings = lines.into_iter().filter_map(|(file, lines)| {
+        let recording = recordings.get(file)?;
+        Some(json!({ "name": recording.name, "sha256": recording.sha256, "unit": recording.unit, "places": lines }))
+    });
+    json!({
+        "recordings": recordings.collect::<Vec<_>>(),
+        "vehicle": target.vehicle(),
+        "role": target.role,
+        "requirement": target.requirement,
+        "monitor": target.monitor,
+        "verdict": target.verdict,
+        "repeat": format!("vda5050-tck audit SLICE --only {}", target.monitor),
+    })
+}
+
+/// The records of a journal with these messages; the first one says what they are a part of.
+pub fn records(messages: Vec<Message>, origin: Value) -> impl Iterator<Item = Record> {
     let first = messages.first().and_then(|message| message.at).unwrap_or_default();
     let stamp = move |at: Option<jiff::Timestamp>| {
         let utc = at.unwrap_or(first);
@@ -174,6 +198,7 @@ pub fn records(messages: Vec<Message>) -> impl Iterator<Item = Record> {
         format: "vda5050-tck.journal/1".to_owned(),
         tool: tck_journal::tool(),
         vantage: "subscriber".to_owned(),
+        bindings: [("slice".to_owned(), origin)].into_iter().collect(),
         ..RunHeader::default()
     };
     let begun = Record {
@@ -245,7 +270,7 @@ mod tests {
                 let shown = !less.is_empty() && target.is_shown(&library.rules, &options, &less).expect("options");
                 assert!(!shown, "{fault}: {left_out} is not needed");
             }
-            let text: Vec<String> = records(part.clone())
+            let text: Vec<String> = records(part.clone(), origin(&target, &part, &[]))
                 .map(|record| serde_json::to_string(&record).expect("JSON"))
                 .collect();
             let lines = tck_capture::Lines::new(

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use tck_view::MessageView;
 
 /// How many spans of one kind are kept; what follows is one span.
@@ -11,7 +11,7 @@ const SPANS: usize = 200;
 const TEXT: usize = 64;
 
 /// A stretch of time in which something was the same.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Span {
     /// From the first message that says it.
@@ -23,8 +23,8 @@ pub struct Span {
 }
 
 /// What a vehicle did over the time of a recording, by `connection`, `mode` and `order`.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct TimeLine(pub BTreeMap<&'static str, Vec<Span>>);
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TimeLine(pub BTreeMap<String, Vec<Span>>);
 
 impl TimeLine {
     /// Takes in a message.
@@ -41,7 +41,7 @@ impl TimeLine {
 
     fn say(&mut self, track: &'static str, what: Option<&str>, at: jiff::Timestamp) {
         let Some(what) = what else { return };
-        let spans = self.0.entry(track).or_default();
+        let spans = self.0.entry(track.to_owned()).or_default();
         let full = spans.len() >= SPANS;
         if let Some(last) = spans.last_mut() {
             // A connection stays as it is until something else is said of it.

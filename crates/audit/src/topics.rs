@@ -1,6 +1,7 @@
 //! Which vehicle a topic belongs to.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 use regex::Regex;
 
@@ -32,6 +33,27 @@ impl Named {
             .map(|name| (name.to_owned(), format!("{before}{name}{behind}")))
             .collect()
     }
+}
+
+/// A topic below a vehicle whose name is none, and nearly one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Beside {
+    /// The topics of the vehicle, with `{topic}` for the name.
+    pub topics: String,
+    /// Manufacturer, if the topic says it.
+    pub manufacturer: String,
+    /// Serial number, if the topic says it.
+    pub serial_number: String,
+    /// The name that is meant.
+    pub meant: String,
+    /// Whether it differs in case and punctuation alone.
+    pub differs_in_spelling: bool,
+}
+
+/// A name without what people vary: case, underscores, hyphens.
+fn plain(name: &str) -> String {
+    let letters = name.chars().filter(char::is_ascii_alphanumeric);
+    letters.map(|letter| letter.to_ascii_lowercase()).collect()
 }
 
 /// How topics are built.
@@ -72,6 +94,46 @@ impl Topics {
         Ok(Self {
             form: Regex::new(&format!("^{form}$")).map_err(|_| wrong())?,
             names: names.map(|rule| rule.name.as_str().to_owned()).collect(),
+        })
+    }
+
+    /// Which parts of a topic of a vehicle are names of somebody, in their order, and of what.
+    pub fn levels(&self, topic: &str) -> Option<Vec<(Range<usize>, &'static str)>> {
+        let found = self.form.captures(topic)?;
+        let kinds = [
+            ("interface", "site"),
+            ("interfaceName", "site"),
+            ("manufacturer", "maker"),
+            ("serialNumber", "vehicle"),
+        ];
+        let levels = kinds
+            .into_iter()
+            .filter_map(|(part, kind)| Some((found.name(part)?.range(), kind)));
+        let mut levels: Vec<_> = levels.collect();
+        levels.sort_by_key(|(range, _)| range.start);
+        Some(levels)
+    }
+
+    /// Reads a topic whose name is nearly one of the protocol.
+    pub fn beside(&self, topic: &str) -> Option<Beside> {
+        let found = self.form.captures(topic)?;
+        let name = found.name("topic")?;
+        let written = name.as_str();
+        if self.names.contains(written) || written.len() > 64 {
+            return None;
+        }
+        let same = self.names.iter().find(|known| plain(known) == plain(written));
+        let near = || {
+            let mut names = self.names.iter();
+            names.find(|known| strsim::osa_distance(&plain(known), &plain(written)) <= (known.len() / 4).min(2))
+        };
+        let text = |part: &str| found.name(part).map_or("", |part| part.as_str()).to_owned();
+        Some(Beside {
+            topics: format!("{}{{topic}}{}", &topic[..name.start()], &topic[name.end()..]),
+            manufacturer: text("manufacturer"),
+            serial_number: text("serialNumber"),
+            differs_in_spelling: same.is_some(),
+            meant: same.or_else(near)?.clone(),
         })
     }
 
@@ -127,6 +189,39 @@ mod tests {
         ] {
             assert_eq!(usual.read(other), None, "{other}");
         }
+    }
+
+    #[test]
+    fn a_name_that_is_nearly_one_is_told_from_others() {
+        let usual = topics(None);
+        let meant = |topic: &str| {
+            let beside = usual.beside(topic)?;
+            Some((beside.meant, beside.differs_in_spelling))
+        };
+        let wanted = |name: &str, spelling| Some((name.to_owned(), spelling));
+        assert_eq!(meant("a/v2/b/c/instantactions"), wanted("instantActions", true));
+        assert_eq!(meant("a/v2/b/c/instant_actions"), wanted("instantActions", true));
+        assert_eq!(meant("a/v2/b/c/instantAction"), wanted("instantActions", false));
+        assert_eq!(meant("a/v2/b/c/orders"), wanted("order", false));
+        assert_eq!(meant("a/v2/b/c/State"), wanted("state", true));
+        for none in [
+            "a/v2/b/c/state",
+            "a/v2/b/c/log",
+            "a/v2/b/c/stats/x",
+            "a/b",
+            "a/vx/b/c/orders",
+        ] {
+            assert_eq!(meant(none), None, "{none}");
+        }
+        let beside = usual.beside("a/v2/b/c/orders").expect("near");
+        assert_eq!(
+            (
+                beside.topics.as_str(),
+                beside.manufacturer.as_str(),
+                beside.serial_number.as_str()
+            ),
+            ("a/v2/b/c/{topic}", "b", "c")
+        );
     }
 
     #[test]

@@ -10,9 +10,10 @@ use super::arrival::{Known, Sorted};
 use super::arrived::{Arrived, timestamp, version};
 use super::conversation::{Concluded, Conversation};
 use super::header::header;
+use super::hint::{Hint, Hints};
 use super::news::Found;
 use super::outcome::Outcome;
-use super::result::VehicleResult;
+use super::result::{HintResult, VehicleResult, Whereabouts};
 use super::side::Side;
 use super::time_line::TimeLine;
 use super::topics::Named;
@@ -29,6 +30,24 @@ const WAITING: usize = 64;
 const FIRST_HAND: Duration = Duration::from_secs(60);
 /// How often the version of a vehicle may change; a vehicle that changes it more often is judged by the last one.
 const STRETCHES: usize = 16;
+/// How many different hints are kept of a vehicle.
+const HINTS: usize = 64;
+
+/// So long before it is recorded a message was written that comes from its sender and not from the store of the broker.
+const FRESH: Duration = Duration::from_secs(5);
+
+/// Whether a message was recorded when it was written.
+fn is_fresh(message: &Message) -> bool {
+    let said = serde_json::from_slice::<Value>(&message.payload)
+        .ok()
+        .as_ref()
+        .and_then(timestamp);
+    let apart = message
+        .at
+        .zip(said)
+        .map(|(at, said)| at.duration_since(said).unsigned_abs());
+    apart.is_some_and(|apart| apart <= FRESH)
+}
 
 /// One vehicle of a recording, with the master control that commands it: what came, in its order, and by which version
 /// of the protocol its [`conversation`](super::conversation) is judged.
@@ -52,6 +71,7 @@ pub(super) struct Vehicle {
     stale: u64,
     /// When a message of this topic was seen last on its way from its sender.
     first_hand: BTreeMap<String, Option<jiff::Timestamp>>,
+    hints: BTreeMap<(String, String), HintResult>,
     time_line: TimeLine,
     /// Whether its connections were judged.
     wired: bool,
@@ -80,6 +100,7 @@ impl Vehicle {
             twice: 0,
             stale: 0,
             first_hand: BTreeMap::new(),
+            hints: BTreeMap::new(),
             time_line: TimeLine::default(),
             wired: false,
             earlier: Vec::new(),
@@ -94,8 +115,11 @@ impl Vehicle {
         }
         *self.counts.entry(name.to_owned()).or_default() += 1;
         let is_first = self.begun.insert(name.to_owned());
-        // Where the recording does not say it, the first message of a topic may be one that was stored.
-        let stale = message.retain.unwrap_or(is_first);
+        // Where the recording does not say it, the first message of a topic may be one that was stored, unless it was written when
+        // it came.
+        let topic = scene.rules.packs.latest().topic(name);
+        let is_stored = topic.is_none_or(|rule| rule.retain) || !is_fresh(&message);
+        let stale = message.retain.unwrap_or(is_first && is_stored);
         if !stale && self.known.again(name, &message.payload) {
             self.twice += 1;
             return true;
@@ -226,7 +250,7 @@ impl Vehicle {
             self.earlier.push(concluded);
         }
         if self.conversation.pack().is_some() {
-            self.conversation.show(&arrived, scene);
+            self.show(&arrived, scene);
             return;
         }
         if self.foreign.is_some() {
@@ -300,7 +324,46 @@ impl Vehicle {
         let sides = roles.map(|role| Side::begin(role, self.header(role, &pack), begun, self.timed, scene));
         self.conversation.begin(pack, sides.into_iter().flatten().collect());
         for arrived in std::mem::take(&mut self.waiting) {
-            self.conversation.show(&arrived, scene);
+            self.show(&arrived, scene);
+        }
+    }
+
+    fn show(&mut self, arrived: &Arrived, scene: Scene<'_>) {
+        self.look(arrived, scene);
+        self.conversation.show(arrived, scene);
+    }
+
+    /// Looks for slips that are allowed. Who asks for certain monitors knows what he wants to see.
+    fn look(&mut self, arrived: &Arrived, scene: Scene<'_>) {
+        let (Some(pack), Some(message), true) = (
+            self.conversation.pack(),
+            arrived.entry.json(),
+            scene.options.only.is_empty(),
+        ) else {
+            return;
+        };
+        let hints = scene.hints.get_or_init(|| Hints::of(&scene.rules.packs));
+        for Hint { pointer, text } in hints.of_message(pack, &arrived.name, message) {
+            let key = (arrived.name.clone(), text.clone());
+            if let Some(known) = self.hints.get_mut(&key) {
+                known.count += 1;
+            } else if self.hints.len() < HINTS {
+                let place = scene.places.of(arrived.number);
+                let first = Whereabouts {
+                    message: arrived.number,
+                    recording: place.map(|place| place.file),
+                    line: place.map(|place| place.line),
+                    at: format!("{:.3}", arrived.at.utc),
+                };
+                let hint = HintResult {
+                    topic: arrived.name.clone(),
+                    pointer,
+                    text,
+                    count: 1,
+                    first,
+                };
+                self.hints.insert(key, hint);
+            }
         }
     }
 
@@ -380,6 +443,7 @@ impl Vehicle {
             twice: std::mem::take(&mut self.twice),
             retained: std::mem::take(&mut self.stale),
             vantage: if self.wired { "tap" } else { "subscriber" }.to_owned(),
+            hints: std::mem::take(&mut self.hints).into_values().collect(),
             time_line: std::mem::take(&mut self.time_line),
             sides,
         }

@@ -82,6 +82,25 @@ impl Read for Growing {
     }
 }
 
+/// What something is that is not text in UTF-8, by its first bytes, and what to do; `None` where they do not tell.
+#[must_use]
+pub fn no_plain_text(begin: &[u8]) -> Option<&'static str> {
+    if let Some((_, what)) = REFUSED.iter().find(|(bytes, _)| begin.starts_with(bytes)) {
+        return Some(what);
+    }
+    if Order::of(begin).is_some() {
+        return Some("UTF-16, where UTF-8 is due: convert it, such as with `iconv -f UTF-16 -t UTF-8`");
+    }
+    let packed = [
+        (GZIP, "packed with gzip: unpack it"),
+        (ZSTD, "packed with zstd: unpack it"),
+    ];
+    packed
+        .into_iter()
+        .find(|(bytes, _)| begin.starts_with(bytes))
+        .map(|(_, what)| what)
+}
+
 /// What is read, unpacked if it is packed.
 ///
 /// # Errors
@@ -197,6 +216,26 @@ mod tests {
         ] {
             let error = text_of(begin.to_vec()).expect_err("refused").to_string();
             assert!(error.contains(wanted), "{error}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_plain_text_is_named() {
+        for (begin, wanted) in [
+            (&b"\xff\xfe{\0"[..], "UTF-16"),
+            (b"\xfe\xff\0{", "UTF-16"),
+            (b"{\0\"\0", "UTF-16"),
+            (b"PK\x03\x04rest", "ZIP archive"),
+            (&[0x1f, 0x8b, 8, 0], "gzip"),
+            (&[0x28, 0xb5, 0x2f, 0xfd], "zstd"),
+        ] {
+            assert!(
+                no_plain_text(begin).is_some_and(|what| what.contains(wanted)),
+                "{wanted}"
+            );
+        }
+        for text in [&b"{}"[..], b"\xef\xbb\xbf{}", b"", b"[", b"{\"a\":\"\xff\"}"] {
+            assert_eq!(no_plain_text(text), None);
         }
     }
 

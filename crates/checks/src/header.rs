@@ -129,7 +129,7 @@ impl Running for Timestamp {
         let Some(header) = header else { return false };
         let Some(written) = header.timestamp.text() else {
             let shown = show(&header.timestamp);
-            let text = format!("timestamp {shown} on {} is no time in UTC", message.name);
+            let text = format!("{}/timestamp: {shown} is no time in UTC", message.name);
             findings.push(broken("HDR-03", record.seq(), text));
             return true;
         };
@@ -264,9 +264,9 @@ impl Running for Version {
         context: &CheckContext<'_>,
         findings: &mut Vec<CheckFinding>,
     ) -> bool {
-        let Some(message) = record.delivered() else {
+        if record.delivered().is_none() {
             return false;
-        };
+        }
         let Some(written) = record.header().and_then(|header| header.version.text()) else {
             return false;
         };
@@ -279,20 +279,15 @@ impl Running for Version {
             .take(4)
             .collect();
         let [Some(major), Some(minor), Some(_)] = parts[..] else {
-            let text = format!(
-                "version {} on {} is not three numbers with dots",
-                quote(written),
-                message.name
-            );
+            let text = format!("version {} is not three numbers with dots", quote(written));
             findings.push(broken("HDR-04", record.seq(), text));
             return true;
         };
         let expected = context.pack.version;
         if (major, minor) != (expected.major, expected.minor) {
             let text = format!(
-                "version {} on {} is another one than {}.{}, by which the device is judged",
+                "version {} is another one than {}.{}, by which the device is judged",
                 quote(written),
-                message.name,
                 expected.major,
                 expected.minor
             );

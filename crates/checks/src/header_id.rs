@@ -155,10 +155,7 @@ impl IdRises {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked above")]
             return Some(whole as u32);
         }
-        let text = format!(
-            "headerId {} on {topic} is no whole number from 0 to 4294967295",
-            show(id)
-        );
+        let text = format!("{topic}/headerId: {} is no whole number from 0 to 4294967295", show(id));
         findings.push(broken("HDR-02", record.seq(), text));
         None
     }

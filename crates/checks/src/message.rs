@@ -3,17 +3,18 @@
 //! Relations between fields and between messages are left to the other checks; so are the fraction digits of
 //! a timestamp and the value of a version, which `header` judges by their own rulings.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
 
 use serde_json::Value;
 
 use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::json::JsonProblem;
-use tck_pack::{Finding, FindingKind, Pack};
+use tck_pack::{Finding, FindingKind, MessageSchema, Pack};
 use tck_view::{
-    ActionView, Edge, FactsheetView, Field, Header, InstantActionsView, Member, MessageView, Names, Node, OrderView,
-    PhysicalParameters, StateView, Topic, VisualizationView,
+    ActionView, BatteryState, Edge, FactsheetView, Field, Header, InstantActionsView, Member, MessageView, Names, Node,
+    OrderView, PhysicalParameters, StateView, Topic, VisualizationView,
 };
 use tck_world::{Fact, Listen, Observation};
 
@@ -60,9 +61,9 @@ pub(super) const SCHEMA: Check = Check {
         "IACT-01",
     ],
     doc: "Every message obeys the schema of its topic, written from the field tables of the document. A finding counts \
-          for JSON-10, for the rule on JSON types or literals it breaks, and for the requirement of the field. What \
-          single precision makes of pi is a warning, once. What a state repeats of a malformed order of the harness \
-          is not judged: that it was taken over is the mistake.",
+          for JSON-10, for the rule on JSON types or literals it breaks, and for the requirement of the field. A \
+          charge outside 0 to 100 is a warning. What single precision makes of pi is a warning, once. What a state \
+          repeats of a malformed order of the harness is not judged: that it was taken over is the mistake.",
     arguments: &[],
     listens: &[Listen::AnyDelivered],
     reads: &[Fact::Malformed],
@@ -127,6 +128,8 @@ const OF_ORDER: [Field; 8] = [
     StateView::zone_set_id,
 ];
 
+/// What rounding adds to a percentage.
+const ROUNDED: f64 = 0.001;
 /// Pi and what single precision, or seven digits, make of it.
 const PI_IN_SINGLE_PRECISION: f64 = std::f64::consts::PI + 5.0e-7;
 
@@ -159,56 +162,21 @@ impl Schema {
         }
     }
 
-    /// Members that are known ones but for their spelling.
+    /// Optional members that are known ones but for their spelling; those that are missing by it were named with that.
     fn misspelled(&self, topic: &str, value: &Value, seq: u64, findings: &mut Vec<CheckFinding>) {
         if let Some(known) = self.members.get(topic) {
-            odd_members(value, known, topic, seq, findings);
+            odd_members(vec![(topic.to_owned(), value)], known, seq, findings);
         }
         for Inner { path, members, .. } in self.inner.iter().filter(|inner| inner.topic.as_str() == topic) {
-            let mut inside = vec![value];
+            let mut inside = vec![(topic.to_owned(), value)];
             for name in path {
                 inside = inside
                     .into_iter()
-                    .flat_map(|value| inner(value, name))
+                    .flat_map(|(place, value)| inner(&place, value, name))
                     .take(INSIDE)
                     .collect();
             }
-            let before = findings.len();
-            for value in inside {
-                odd_members(value, members, topic, seq, findings);
-            }
-            // The same mistake is made everywhere; once is enough.
-            findings.truncate(before + 1);
-        }
-    }
-
-    /// A member that is missing further inside, and stands there in another spelling.
-    fn deep_misspelling(
-        &self,
-        topic: &str,
-        finding: &Finding,
-        value: &Value,
-        seq: u64,
-        findings: &mut Vec<CheckFinding>,
-    ) {
-        let Some((inside, name)) = finding.path.rsplit_once('/').filter(|(inside, _)| !inside.is_empty()) else {
-            return;
-        };
-        let path: Vec<&str> = inside
-            .split('/')
-            .skip(1)
-            .filter(|part| part.parse::<u32>().is_err())
-            .collect();
-        // Those are looked through anyway.
-        let mut looked_through = self.inner.iter().filter(|inner| inner.topic.as_str() == topic);
-        if finding.kind != FindingKind::Missing || looked_through.any(|inner| inner.path == path) {
-            return;
-        }
-        let members = value.pointer(inside).and_then(Value::as_object);
-        let mut members = members.into_iter().flatten().map(|(member, _)| member);
-        if let Some(other) = members.find(|other| other.len() < 64 && plain(other) == plain(name)) {
-            let text = format!("member {} on {topic} is spelled {name:?}", quote(other));
-            findings.push(broken("JSON-01", seq, text));
+            odd_members(inside, members, seq, findings);
         }
     }
 }
@@ -238,23 +206,62 @@ const INNER: [(Topic, &[Field]); 16] = [
 /// How many of them are looked at.
 const INSIDE: usize = 512;
 
-fn inner<'v>(value: &'v Value, name: &str) -> Vec<&'v Value> {
+fn inner<'v>(place: &str, value: &'v Value, name: &str) -> Vec<(String, &'v Value)> {
     match value.get(name) {
-        Some(Value::Array(list)) => list.iter().take(INSIDE).collect(),
-        Some(one) => vec![one],
+        Some(Value::Array(list)) => {
+            let all = list.iter().take(INSIDE).enumerate();
+            all.map(|(at, one)| (format!("{place}/{name}/{at}"), one)).collect()
+        }
+        Some(one) => vec![(format!("{place}/{name}"), one)],
         None => Vec::new(),
     }
 }
 
-/// Members that are known ones but for their spelling.
-fn odd_members(value: &Value, known: &[String], topic: &str, seq: u64, findings: &mut Vec<CheckFinding>) {
-    let odd = value.as_object().into_iter().flatten().map(|(name, _)| name);
-    for name in odd.filter(|name| name.len() < 64 && !known.contains(name)).take(16) {
-        if let Some(meant) = known.iter().find(|known| plain(known) == plain(name)) {
-            let text = format!("member {} on {topic} is spelled {meant:?}", quote(name));
-            findings.push(broken("JSON-01", seq, text));
+/// Members of these objects that are known ones but for their spelling. Where the right one stands beside it, it is one of the
+/// vendor's own.
+fn odd_members(objects: Vec<(String, &Value)>, known: &[String], seq: u64, findings: &mut Vec<CheckFinding>) {
+    // The same mistake is made everywhere; once is enough.
+    let mut said = BTreeSet::new();
+    for (place, value) in objects {
+        let odd = value.as_object().into_iter().flatten().map(|(name, _)| name);
+        for name in odd.filter(|name| name.len() < 64 && !known.contains(name)).take(16) {
+            let meant = known.iter().find(|known| plain(known) == plain(name));
+            let Some(meant) = meant.filter(|meant| value.get(meant.as_str()).is_none()) else {
+                continue;
+            };
+            let is_said = |finding: &CheckFinding| {
+                finding.seq == seq && finding.message.starts_with(&format!("{place}/{meant}: "))
+            };
+            if !findings.iter().any(is_said) && said.insert(name.clone()) {
+                let text = format!("{place}/{name}: this member is spelled {meant:?}");
+                findings.push(broken("JSON-01", seq, text));
+            }
         }
     }
+}
+
+/// The member that stands there instead of one that is missing: the same but for its spelling, or nearly the same.
+fn standing_instead<'v>(finding: &Finding, schema: &MessageSchema, value: &'v Value) -> Option<&'v str> {
+    let (holder, name) = finding.path.rsplit_once('/')?;
+    let members = value.pointer(holder)?.as_object()?;
+    let path: Vec<&str> = holder
+        .split('/')
+        .skip(1)
+        .filter(|part| part.parse::<u32>().is_err())
+        .collect();
+    let known = schema.members(&path);
+    let odd = || {
+        let names = members.keys().map(String::as_str);
+        names.filter(|other| other.len() < 64 && !known.iter().any(|known| known == other))
+    };
+    odd()
+        .find(|other| plain(other) == plain(name))
+        .or_else(|| odd().find(|other| is_slip(other, name)))
+}
+
+/// Whether one name is the other but for a slip of the hand.
+fn is_slip(one: &str, other: &str) -> bool {
+    strsim::osa_distance(one, other) <= (other.len() / 4).min(2)
 }
 
 fn plain(name: &str) -> String {
@@ -294,17 +301,42 @@ impl Running for Schema {
                 }
                 continue;
             }
-            let text = format!("{topic}{}: {}", finding.path, finding.message);
+            let mut text = format!("{topic}{}: {}", finding.path, finding.message);
+            let instead = Some(&finding).filter(|finding| finding.kind == FindingKind::Missing);
+            let instead = instead.and_then(|finding| standing_instead(finding, schema, value));
+            if let Some(other) = instead {
+                let _ = write!(text, ", and {} stands there", quote(other));
+            }
             for id in requirements(context.pack, topic, &finding, value) {
                 findings.push(broken(id, seq, text.clone()));
             }
-            self.deep_misspelling(topic, &finding, value, seq, findings);
+            let name = finding.path.rsplit('/').next().unwrap_or_default();
+            if instead.is_some_and(|other| plain(other) == plain(name)) {
+                findings.push(broken("JSON-01", seq, text));
+            }
         }
         self.misspelled(topic, value, seq, findings);
-        let sheet = record.message().and_then(MessageView::factsheet);
+        let view = record.message();
+        let charge = view
+            .and_then(MessageView::state)
+            .and_then(|state| beyond_full(state, record.names(), seq));
+        findings.extend(charge);
+        let sheet = view.and_then(MessageView::factsheet);
         findings.extend(sheet.and_then(|sheet| without_height(sheet, record.names(), seq)));
         true
     }
+}
+
+/// A charge that is no percentage.
+fn beyond_full(state: &StateView, names: &Names, seq: u64) -> Option<CheckFinding> {
+    let charge = state.battery_state.there()?.battery_charge.float()?;
+    let (object, member) = (
+        names.name(StateView::battery_state)?,
+        names.name(BatteryState::battery_charge)?,
+    );
+    let text = format!("state/{object}/{member}: {charge} is not between 0 and 100 percent");
+    let is_one = (-ROUNDED..=100.0 + ROUNDED).contains(&charge);
+    (!is_one).then(|| remark("STATE-MSG-15", seq, text))
 }
 
 /// The lowest height of a vehicle, which the document asks for and the schema does not.
@@ -494,6 +526,37 @@ mod tests {
     fn a_known_member_in_other_spelling_is_found() {
         let found = state(&json!({ "driving": null, "Driving": false }));
         assert_eq!(found, ["JSON-10", "STATE-MSG-01", "STATE-01", "JSON-01"]);
+    }
+
+    #[test]
+    fn a_member_of_ones_own_beside_the_right_one_is_no_slip() {
+        assert!(state(&json!({ "Driving": false, "charging_": true })).is_empty());
+        assert_eq!(state(&json!({ "Paused": true })), ["JSON-01"]);
+        assert_eq!(state(&json!({ "paused": true, "Paused": true })), Vec::<String>::new());
+    }
+
+    #[test]
+    fn a_charge_that_is_no_percentage_is_a_warning() {
+        let charged = |charge: f64| state(&json!({ "batteryState": { "batteryCharge": charge, "charging": false } }));
+        for right in [0.0, -0.0, 0.5, 80.0, 100.0, 100.000_007] {
+            assert!(charged(right).is_empty(), "{right}");
+        }
+        for wrong in [-1.0, 100.1, 105.3, 255.0, 1.0e300] {
+            assert_eq!(charged(wrong), ["STATE-MSG-15 warning"], "{wrong}");
+        }
+    }
+
+    #[test]
+    fn what_stands_instead_of_a_missing_member_is_named_with_it() {
+        let mut trace = Trace::subscriber();
+        trace.state(&json!({ "driving": null, "Driving": false, "errors": null, "error": [] }));
+        let found = trace.judge("message/schema").findings;
+        let texts: std::collections::BTreeSet<&str> = found.iter().map(|finding| finding.message.as_str()).collect();
+        let wanted = [
+            "state/driving: `driving` is missing, and \"Driving\" stands there",
+            "state/errors: `errors` is missing, and \"error\" stands there",
+        ];
+        assert_eq!(texts.into_iter().collect::<Vec<_>>(), wanted);
     }
 
     #[test]

@@ -8,6 +8,7 @@
 
 mod assign;
 mod curve;
+mod doubts;
 mod drawing;
 mod graph;
 mod layout;

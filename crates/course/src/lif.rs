@@ -147,6 +147,10 @@ impl Layout {
 impl File {
     fn read(source: &Arc<Source>) -> Result<Self, Vec<Diagnostic>> {
         serde_json::from_str(&source.text).map_err(|error| {
+            if let Some(version) = other_version(&source.text) {
+                let title = format!("a layout of LIF {version}; LIF 1.0 is read");
+                return vec![Diagnostic::new("lif", Span::new(source, 0, 0), title, "in this file")];
+            }
             let at = offset(&source.text, error.line(), error.column());
             let message = error.to_string();
             let label = message
@@ -170,6 +174,17 @@ impl File {
             .map(|properties| properties.vehicle_type_id.as_str())
             .collect()
     }
+}
+
+/// The version a file names, where it is another one than is read.
+fn other_version(text: &str) -> Option<String> {
+    let file: Value = serde_json::from_str(text).ok()?;
+    let version = file.pointer("/metaInformation/lifVersion")?.as_str()?;
+    let is_read = version
+        .split('.')
+        .next()
+        .is_some_and(|major| major == "0" || major == "1");
+    (!is_read).then(|| version.chars().take(32).collect())
 }
 
 /// Byte offset of a line and a column, both counted from 1.

@@ -18,7 +18,7 @@ use tck_check::{CheckContext, CheckFinding, Running, Shared, find};
 use tck_journal::Entry;
 use tck_journal::event::Event;
 use tck_result::{MonitorFinding, MonitorResult};
-use tck_suite::model::{Monitor, Need, Rule};
+use tck_suite::model::{Monitor, Need, Recordings, Rule};
 use tck_world::{End, Listens, Observation, World};
 
 /// How many occurrences of a finding are kept by number.
@@ -40,6 +40,8 @@ pub struct MonitorJudge {
     broken: Option<(String, u64)>,
     /// The requirement of the first fail of the run.
     accuses: Option<String>,
+    /// Whether findings that say different things are kept apart: they are taken after each entry.
+    apart: bool,
 }
 
 /// A message without which nothing is known of a requirement.
@@ -115,7 +117,14 @@ impl MonitorJudge {
             findings: Vec::new(),
             broken: None,
             accuses: None,
+            apart: false,
         })
+    }
+
+    /// From now on findings that say different things are kept apart, where each message is judged by itself: what is wrong with it
+    /// is named at once. What one message shows beside others is one mistake, however it is said.
+    pub(super) fn keep_apart(&mut self) {
+        self.apart = self.monitor.recordings == Recordings::Message;
     }
 
     fn watch(rule: &Rule, ground: &Ground, bindings: &Bindings, known: &mut Knowledge) -> Result<Watching, Unbound> {
@@ -264,16 +273,18 @@ impl MonitorJudge {
                 self.broken = Some((id.as_str().to_owned(), finding.seq));
                 self.accuses.get_or_insert_with(|| id.as_str().to_owned());
             }
-            let known = self
-                .findings
-                .iter_mut()
-                .find(|known| known.requirement == id.as_str() && known.verdict == verdict);
+            let is_full = self.findings.len() >= DIFFERENT;
+            let is_apart = self.apart && !is_full;
+            let known = self.findings.iter_mut().find(|known| {
+                known.requirement == id.as_str() && known.verdict == verdict && (!is_apart || known.message == message)
+            });
             if let Some(known) = known {
                 known.count += 1;
                 if known.first.len() < FIRST && !known.first.contains(&finding.seq) {
                     known.first.push(finding.seq);
                 }
-            } else if self.findings.len() < DIFFERENT {
+            // No requirement goes without a word because another one is broken in many ways.
+            } else if !is_full || self.apart {
                 self.findings.push(MonitorFinding {
                     requirement: id.as_str().to_owned(),
                     verdict,

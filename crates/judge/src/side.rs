@@ -42,7 +42,7 @@ impl SideJudge {
             Timeline::of_vehicles(&header.vehicles, &ground.pack)
         };
         Ok(Self {
-            watches: Watches::begin(&monitors, &ground, vehicles, header.vantage == "tap"),
+            watches: Watches::begin(&monitors, &ground, vehicles, header.vantage == "tap").apart(),
             timeline,
             ground,
             company: None,

@@ -154,6 +154,18 @@ impl Watches {
         }
     }
 
+    /// Keeps apart what says different things, for those who take what was found after each entry.
+    pub fn apart(mut self) -> Self {
+        let others = self.others.iter_mut().map(|(_, watch)| watch);
+        for monitor in std::iter::once(&mut self.first)
+            .chain(others)
+            .flat_map(|watch| &mut watch.monitors)
+        {
+            monitor.keep_apart();
+        }
+        self
+    }
+
     /// Shows the next entry to those it concerns.
     pub fn observe(&mut self, entry: &Entry, subject: Option<&str>, timeline: &Timeline, ground: &Ground) {
         let place = timeline.place(entry);

@@ -82,7 +82,8 @@ impl Standing {
     }
 
     /// Of several cases the worst stands for them; what does not apply, or decided nothing, stands behind what was decided.
-    fn join(self, other: Self) -> Self {
+    #[must_use]
+    pub fn join(self, other: Self) -> Self {
         match (self, other) {
             (Self::Decided(one), Self::Decided(other)) => Self::Decided(one.join(other)),
             (one @ Self::Decided(_), _) | (_, one @ Self::Decided(_)) => one,
@@ -299,6 +300,15 @@ fn changes(before: Vec<(String, Standing)>, after: Vec<(String, Standing)>) -> V
 }
 
 impl Comparison {
+    /// Of requirements alone, each by its name.
+    #[must_use]
+    pub fn of_requirements(before: Vec<(String, Standing)>, after: Vec<(String, Standing)>) -> Self {
+        Self {
+            requirements: changes(before, after),
+            ..Self::default()
+        }
+    }
+
     /// Whether nothing changed.
     #[must_use]
     pub fn is_empty(&self) -> bool {

@@ -17,16 +17,20 @@ use tck_result::RunResult;
 const SARIF: [u8; 3] = [2, 1, 0];
 
 /// One requirement broken in one place.
-struct Issue<'a> {
-    requirement: &'a str,
-    verdict: Verdict,
-    message: String,
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Issue<'a> {
+    /// Its id.
+    pub requirement: &'a str,
+    /// How badly.
+    pub verdict: Verdict,
+    /// What is wrong.
+    pub message: String,
     /// File and line.
-    place: (String, usize),
+    pub place: (String, usize),
     /// The test or monitor.
-    by: &'a str,
+    pub by: &'a str,
     /// Whether it is about the run itself, and not about the device.
-    of_run: bool,
+    pub of_run: bool,
 }
 
 impl Issue<'_> {
@@ -112,6 +116,25 @@ pub fn code_quality(result: &RunResult) -> String {
 #[must_use]
 pub fn code_quality_of(trouble: &NoResult) -> String {
     quality_page(&trouble_issues(trouble))
+}
+
+/// GitLab's code quality report of these issues.
+#[must_use]
+pub fn code_quality_of_issues(issues: &[Issue<'_>]) -> String {
+    quality_page(issues)
+}
+
+/// SARIF 2.1.0 of these issues, found by this tool.
+#[must_use]
+pub fn sarif_of_issues(tool: &str, issues: &[Issue<'_>], sources: &Sources) -> String {
+    let call = Invocation {
+        tool,
+        run: None,
+        started: None,
+        successful: true,
+        exit: None,
+    };
+    sarif_log(issues, sources, &call)
 }
 
 fn quality_page(issues: &[Issue<'_>]) -> String {

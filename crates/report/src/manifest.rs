@@ -145,28 +145,36 @@ fn walk(dir: &Path, prefix: &str, found: &mut Vec<String>) -> Result<(), Manifes
     Ok(())
 }
 
+/// Length and SHA-256, in hexadecimal, of a file.
+///
+/// # Errors
+/// What the operating system says.
+pub fn digest(path: &Path) -> io::Result<(u64, String)> {
+    let mut hash = Sha256::new();
+    let mut file = std::fs::File::open(path)?;
+    let mut bytes = 0;
+    let mut buffer = vec![0; 64 * 1024];
+    loop {
+        let length = file.read(&mut buffer)?;
+        if length == 0 {
+            return Ok((bytes, hex(&hash.finalize())));
+        }
+        hash.update(&buffer[..length]);
+        bytes += length as u64;
+    }
+}
+
 fn hash(dir: &Path, name: &str) -> Result<ManifestFile, ManifestError> {
     let path = dir.join(name);
     let kind = std::fs::symlink_metadata(&path).map_err(io_error(&path))?;
     if !kind.is_file() {
         return Err(ManifestError::Name(path));
     }
-    let mut hash = Sha256::new();
-    let mut file = std::fs::File::open(&path).map_err(io_error(&path))?;
-    let mut bytes = 0;
-    let mut buffer = vec![0; 64 * 1024];
-    loop {
-        let length = file.read(&mut buffer).map_err(io_error(&path))?;
-        if length == 0 {
-            break;
-        }
-        hash.update(&buffer[..length]);
-        bytes += length as u64;
-    }
+    let (bytes, sha256) = digest(&path).map_err(io_error(&path))?;
     Ok(ManifestFile {
         path: name.to_owned(),
         bytes,
-        sha256: hex(&hash.finalize()),
+        sha256,
     })
 }
 

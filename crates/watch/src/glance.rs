@@ -88,6 +88,7 @@ impl Kind {
             first: self.last.clone(),
             last: self.last.clone(),
             text: self.text.clone(),
+            shown: None,
             interpretation: None,
         }
     }

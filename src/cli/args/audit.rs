@@ -51,7 +51,7 @@ pub struct Audit {
     /// Protocol version all are judged by; otherwise that which their messages name
     #[arg(long, value_name = "VERSION", help_heading = "Selection")]
     pub protocol: Option<String>,
-    /// Write result.json, junit.xml and report.html, with a time line for each vehicle, into this folder
+    /// Write result.json, junit.xml, report.html and manifest.json into this folder, for `report --verify`, `--compare` and `--as`
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Write messages and findings as Parquet into this folder: a table for each topic, and one of findings
@@ -63,6 +63,9 @@ pub struct Audit {
     /// Write the smallest journal that still shows a finding to standard output: the first one of this requirement or monitor
     #[arg(long, value_name = "FINDING")]
     pub slice: Option<String>,
+    /// Leave out names of makers, vehicles, maps, nodes, orders and loads, free texts, and where on the floor something is
+    #[arg(long, conflicts_with_all = ["vehicle", "follow"])]
+    pub redact: bool,
     /// How results are written to standard output
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,

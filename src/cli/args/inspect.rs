@@ -134,6 +134,7 @@ Examples:
   vda5050-tck report --attestation DIR > attestation.json   for a signer, such as cosign
   vda5050-tck report --as code-quality DIR > quality.json   for a pipeline; `run --as` writes it in every case
   vda5050-tck report --compare BEFORE AFTER             what became better or worse, or is lost
+  vda5050-tck report --compare audits/monday audits/tuesday   audits, too; --verify and --as take them as well
   vda5050-tck report --compare A B C --page > runs.html a page: requirement by run
 
 Exit codes of --compare: 0 nothing became worse · 1 something became worse, or is not decided any more
@@ -143,7 +144,7 @@ Exit codes of --compare: 0 nothing became worse · 1 something became worse, or 
 #[derive(Clone, Debug, Args)]
 #[command(after_help = REPORT_HELP)]
 pub struct Report {
-    /// The folder of a finished run
+    /// The folder of a finished run, or of an audit
     #[arg(value_name = "DIR", required_unless_present = "compare", conflicts_with = "compare")]
     pub directory: Option<PathBuf>,
     /// Check every file against the manifest; nothing is written

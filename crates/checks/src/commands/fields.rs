@@ -11,6 +11,7 @@ use tck_view::{
     ActionView, Deviation, Edge, Element, Field, InstantActionsView, Member, MessageView, Node, NodePosition,
     OrderView, Text,
 };
+use tck_world::members::ELEMENTS;
 use tck_world::{Fact, Factsheet, Listen, Observation, Topic};
 
 /// `commands/arrays`.
@@ -108,12 +109,14 @@ fn arrays(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> 
         return false;
     }
     if order.edges.is_absent() {
-        found.broken("ORD-MSG-06", "edges is left out");
+        found.broken("ORD-MSG-06", "order/edges: `edges` is missing");
     }
-    for element in elements(order).filter(|element| element.is_object()) {
+    let nodes = order.nodes.iter().map(Element::Node).enumerate().take(ELEMENTS);
+    let edges = order.edges.iter().map(Element::Edge).enumerate().take(ELEMENTS);
+    for (at, element) in nodes.chain(edges).filter(|(_, element)| element.is_object()) {
         if element.actions().is_absent() {
-            let id = quote(element.id().or_empty());
-            found.broken("ORD-MSG-06", format!("actions of {id} is left out"));
+            let list = if element.is_edge() { "edges" } else { "nodes" };
+            found.broken("ORD-MSG-06", format!("order/{list}/{at}/actions: `actions` is missing"));
         }
     }
     true

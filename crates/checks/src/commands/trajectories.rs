@@ -78,7 +78,13 @@ fn ends(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> bo
             let distance = (x - point.0).hypot(y - point.1);
             if distance > END + allowed.max(0.0) {
                 let id = quote(edge.edge_id.or_empty());
-                let text = format!("the trajectory of edge {id} {verb} {distance:.2} m from its node");
+                let at = order
+                    .edges
+                    .iter()
+                    .position(|known| std::ptr::eq(known, *edge))
+                    .unwrap_or_default();
+                let text =
+                    format!("order/edges/{at}/trajectory: the curve of edge {id} {verb} {distance:.2} m from its node");
                 found.broken("ORD-MSG-30", text);
             }
         }

@@ -241,8 +241,14 @@ fn the_schema_names_the_requirements_of_commands() {
         order["nodes"][0]["actions"] = json!([{ "actionType": "x", "actionId": "a", "blockingType": "hard" }]);
     };
     assert_eq!(schema(blocking), ["JSON-10", "JSON-02", "ORD-MSG-16"]);
-    let snake = |order: &mut Value| order["nodes"][0]["sequence_id"] = json!(0);
-    assert_eq!(schema(snake), ["JSON-01"]);
+    let snake = |order: &mut Value| {
+        let node = order["nodes"][0].as_object_mut().expect("a node");
+        let id = node.remove("sequenceId").expect("a number");
+        node.insert("sequence_id".to_owned(), id);
+    };
+    assert_eq!(schema(snake), ["JSON-10", "ORD-MSG-05", "JSON-01"]);
+    let beside = |order: &mut Value| order["nodes"][0]["sequence_id"] = json!(0);
+    assert!(schema(beside).is_empty());
 }
 
 #[test]

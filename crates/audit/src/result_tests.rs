@@ -1,0 +1,93 @@
+use std::collections::BTreeMap;
+
+use super::result::{FindingResult, SideResult, VehicleResult, whole};
+use super::time_line::TimeLine;
+use tck_base::verdict::Verdict;
+use tck_pack::Role;
+
+fn finding(requirement: &str, verdict: Verdict, message: u64, text: &str) -> FindingResult {
+    FindingResult {
+        monitor: "a/b".to_owned(),
+        requirement: requirement.to_owned(),
+        verdict,
+        count: message,
+        message,
+        recording: None,
+        line: None,
+        first: String::new(),
+        last: String::new(),
+        text: text.to_owned(),
+        shown: None,
+        interpretation: None,
+    }
+}
+
+fn commanding(serial: &str, found: Vec<FindingResult>) -> VehicleResult {
+    let passed = [("X-9".to_owned(), "a/b".to_owned())].into();
+    let side = SideResult::new(Role::MasterControl, 5, 1, found, passed, Vec::new());
+    VehicleResult {
+        manufacturer: "m".to_owned(),
+        serial_number: serial.to_owned(),
+        topics: String::new(),
+        protocol: None,
+        not_judged: None,
+        messages: BTreeMap::new(),
+        holes: 0,
+        twice: 0,
+        retained: 0,
+        vantage: String::new(),
+        hints: Vec::new(),
+        time_line: TimeLine::default(),
+        sides: vec![side],
+    }
+}
+
+#[test]
+fn what_is_found_at_one_place_of_one_message_is_one_mistake() {
+    let found = vec![
+        finding("X-1", Verdict::Fail, 3, "state/orderId: 7 is no text"),
+        finding("X-2", Verdict::Fail, 3, "state/orderId: 7 is no text, and odd"),
+        finding("X-3", Verdict::Warning, 3, "state/orderId: 7 is seldom"),
+        finding("X-1", Verdict::Fail, 4, "state/orderId: 8 is no text"),
+        finding("X-1", Verdict::Fail, 3, "another sentence"),
+    ];
+    let side = SideResult::new(Role::Agv, 9, 1, found, [].into(), Vec::new());
+    let mistakes = side.mistakes();
+    let shown: Vec<(String, &str, u64)> = mistakes
+        .iter()
+        .map(|mistake| {
+            (
+                mistake.requirements.join(" "),
+                mistake.worst.text.as_str(),
+                mistake.count,
+            )
+        })
+        .collect();
+    let wanted = [
+        ("X-1 X-2 X-3".to_owned(), "state/orderId: 7 is no text, and odd", 3),
+        ("X-1".to_owned(), "another sentence", 3),
+        ("X-1".to_owned(), "state/orderId: 8 is no text", 4),
+    ];
+    assert_eq!(shown, wanted);
+}
+
+#[test]
+fn the_master_control_of_several_vehicles_is_judged_as_one() {
+    let wrong = || vec![finding("X-1", Verdict::Fail, 3, "a")];
+    let one = commanding("1", wrong());
+    assert_eq!(whole(&[one.clone()]), None);
+    // The same vehicle after an update is no second one.
+    assert_eq!(whole(&[one.clone(), one.clone()]), None);
+    let all = [one, commanding("2", Vec::new()), commanding("3", wrong())];
+    let whole = whole(&all).expect("several");
+    assert_eq!(
+        (whole.verdict, whole.vehicles, whole.messages),
+        (Some(Verdict::Fail), 3, 15)
+    );
+    let decided: Vec<(&str, Verdict, usize)> = whole
+        .requirements
+        .iter()
+        .map(|known| (known.id.as_str(), known.verdict, known.vehicles))
+        .collect();
+    assert_eq!(decided, [("X-1", Verdict::Fail, 2), ("X-9", Verdict::Pass, 3)]);
+}
