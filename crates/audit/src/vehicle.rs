@@ -22,7 +22,7 @@ use tck_capture::Message;
 use tck_journal::event::{Event, Record, RunHeader, Source};
 use tck_journal::{Entry, Payload};
 use tck_pack::{Pack, Role, Said};
-use tck_view::{MessageView, Names};
+use tck_view::{MessageView, Names, Topic};
 
 /// How many messages wait until the vehicle has said which version it speaks.
 const WAITING: usize = 64;
@@ -38,10 +38,8 @@ const FRESH: Duration = Duration::from_secs(5);
 
 /// Whether a message was recorded when it was written.
 fn is_fresh(message: &Message) -> bool {
-    let said = serde_json::from_slice::<Value>(&message.payload)
-        .ok()
-        .as_ref()
-        .and_then(timestamp);
+    let said = MessageView::of_slice(Topic::Other, &message.payload, &Names::default());
+    let said = said.ok().as_ref().and_then(timestamp);
     let apart = message
         .at
         .zip(said)
@@ -118,8 +116,8 @@ impl Vehicle {
         // Where the recording does not say it, the first message of a topic may be one that was stored, unless it was written when
         // it came.
         let topic = scene.rules.packs.latest().topic(name);
-        let is_stored = topic.is_none_or(|rule| rule.retain) || !is_fresh(&message);
-        let stale = message.retain.unwrap_or(is_first && is_stored);
+        let is_stored = || topic.is_none_or(|rule| rule.retain) || !is_fresh(&message);
+        let stale = message.retain.unwrap_or_else(|| is_first && is_stored());
         if !stale && self.known.again(name, &message.payload) {
             self.twice += 1;
             return true;

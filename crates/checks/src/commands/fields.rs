@@ -11,7 +11,7 @@ use tck_view::{
     ActionView, Deviation, Edge, Element, Field, InstantActionsView, Member, MessageView, Node, NodePosition,
     OrderView, Text,
 };
-use tck_world::members::ELEMENTS;
+use tck_world::ordered::ELEMENTS;
 use tck_world::{Fact, Factsheet, Listen, Observation, Topic};
 
 /// `commands/arrays`.
