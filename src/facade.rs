@@ -16,7 +16,7 @@ use tck_report::statement;
 use tck_report::text::Color;
 use tck_result::RunResult;
 use tck_run::{
-    Bundle, BundleError, End, Finished, OutputError, Place, RequestBuilder, RunError, SelectionError, SocketRun,
+    Bundle, BundleError, End, Finished, LiveRun, OutputError, ProfileContext, RequestBuilder, RunError, SelectionError,
     VirtualRun, pack_of, run_silently, sources, write_all,
 };
 
@@ -167,13 +167,13 @@ impl Tck {
                 let surroundings = Surroundings::of_process();
                 let effective = profile::load(Some(&path), &[], &surroundings, &library.rules.hooks)?;
                 let pack = pack_of(&library, &effective).map_err(|wrong| vec![wrong])?;
-                let place = Place {
+                let place = ProfileContext {
                     folder: path.parent().map_or_else(PathBuf::new, Path::to_path_buf),
                     profile: Some(path),
-                    ..Place::default()
+                    ..ProfileContext::default()
                 };
                 let role = effective.profile.device.role;
-                let mut run = SocketRun::of_profile(&effective, &library, &pack, &surroundings, place)?;
+                let mut run = LiveRun::of_profile(&effective, &library, &pack, &surroundings, place)?;
                 run.request = self.request.build(role, &library, &pack)?;
                 (run.carry_out_silently(&library, &pack)?, pack)
             }

@@ -124,7 +124,7 @@ fn sources() -> Vec<(PathBuf, String)> {
 }
 
 /// Where a file stands: room, then folders below it. `judge/window.rs` for `crates/judge/src/window.rs`, `tap/pump.rs` for
-/// `crates/net/src/tap/pump.rs`, `cli/run.rs` for `src/cli/run.rs`.
+/// `crates/net/src/tap/pump.rs`, `cli/run.rs` for `src/cli/run/mod.rs`.
 fn in_room(path: &Path) -> String {
     let below = path.strip_prefix(root()).expect("below the root").display().to_string();
     if let Some(program) = below.strip_prefix("src/") {

@@ -6,8 +6,8 @@ use super::args::Audit as Arguments;
 use super::exit::Exit;
 use super::problem::Problem;
 use super::recordings::{broken, in_time, open, show};
-use tck_audit::crew::{self, Crew};
 use tck_audit::export::Export;
+use tck_audit::pool::{self, WorkerPool};
 use tck_audit::result::{Recording, VehicleResult};
 use tck_audit::{AuditError, Options, Redactor, bundle, own_run};
 use tck_base::diagnostic::Diagnostic;
@@ -35,7 +35,7 @@ pub fn audit(arguments: &Arguments) -> Result<Exit, Problem> {
         Some(folder) => Some(Export::begin(folder, &library.rules.packs).map_err(not_written)?),
         None => None,
     };
-    let mut result = crew::judged::<Problem>(&library.rules, &options, |crew| {
+    let mut result = pool::judged::<Problem>(&library.rules, &options, |crew| {
         read(arguments, &library, &options, crew, &mut runs, |crew, message| {
             if let (Some(export), Some(address)) = (&mut export, crew.address(&message.topic)) {
                 let written = export.message(crew.messages() + 1, message, &address);
@@ -68,9 +68,9 @@ fn read(
     arguments: &Arguments,
     library: &Library,
     options: &Options,
-    crew: &mut Crew<'_>,
+    crew: &mut WorkerPool<'_>,
     runs: &mut Vec<VehicleResult>,
-    mut passing: impl FnMut(&Crew<'_>, &Message) -> Result<(), Problem>,
+    mut passing: impl FnMut(&WorkerPool<'_>, &Message) -> Result<(), Problem>,
 ) -> Result<Vec<Recording>, Problem> {
     let mut names = Vec::new();
     let mut units = Vec::new();

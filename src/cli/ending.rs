@@ -5,13 +5,13 @@ use tokio::sync::watch;
 use super::exit::Exit;
 use super::problem::Problem;
 use super::signals::Signals;
-use crate::ui::{Desk, put_terminal_back};
+use crate::ui::{Prompter, put_terminal_back};
 use tck_run::ENDS_WITHIN;
 
 /// Two wishes about the end of a run, and the desk where they are answered.
 pub(super) struct Ending {
     /// Where a person is asked, and can end the run, too.
-    pub(super) desk: Desk,
+    pub(super) desk: Prompter,
     /// Turns true when the run is to end in good order.
     pub(super) interrupt: watch::Receiver<bool>,
     /// Turns true when it is to end at once; its report is still written.
@@ -23,7 +23,7 @@ impl Ending {
     pub(super) fn listen() -> Result<Self, Problem> {
         let (stop, interrupt) = watch::channel(false);
         let (quits, quit) = watch::channel(false);
-        let desk = Desk::new(stop.clone());
+        let desk = Prompter::new(stop.clone());
         let mut signals = Signals::listen()?;
         let said = desk.clone();
         tokio::spawn(async move {

@@ -7,7 +7,7 @@ use bytes::Bytes;
 use serde_json::{Value, json};
 
 use super::args::{Format, Validate};
-use super::pieces::{Content, Form, Pieces};
+use super::message_stream::{Content, Form, Pieces};
 use super::problem::Problem;
 use tck_audit::{Flaw, Hint, Hints, single};
 use tck_base::diagnostic::{Diagnostic, closest};
@@ -16,7 +16,7 @@ use tck_journal::event::PAYLOAD_LIMIT;
 use tck_journal::json::{JsonProblem, Parsed};
 use tck_journal::place;
 use tck_judge::Library;
-use tck_pack::{Pack, Said};
+use tck_pack::{Pack, VersionClaim};
 use tck_report::clean::{line, short};
 
 /// What was counted in a file.
@@ -239,10 +239,10 @@ fn message(text: &[u8], begin: Begin, judging: &Judging<'_>) -> Checked {
     let said = value.and_then(|value| value.get("version")?.as_str());
     let wanted = arguments.protocol.as_deref().or(said);
     let pack = match wanted.map(|version| (version, packs.said(version))) {
-        Some((_, Said::Known(pack))) => pack,
+        Some((_, VersionClaim::Known(pack))) => pack,
         None => packs.latest(),
         // What is no version is a mistake like others: the rest is judged.
-        Some((version, Said::NoVersion)) if arguments.protocol.is_none() => packs.nearest(version, None),
+        Some((version, VersionClaim::NoVersion)) if arguments.protocol.is_none() => packs.nearest(version, None),
         Some((version, _)) => {
             let known: Vec<String> = packs.all().iter().map(|pack| pack.version.to_string()).collect();
             let at = value

@@ -14,7 +14,7 @@ use tck_judge::Library;
 use tck_profile::{Effective, Surroundings};
 use tck_report::advice::advice;
 use tck_report::statement::many;
-use tck_run::{Floor, How, Place, RunError, RunPlan, SocketRun, Waits};
+use tck_run::{Floor, How, LiveRun, ProfileContext, RunError, RunPlan, Waits};
 
 /// How many tests of a reason are named.
 const NAMED: usize = 3;
@@ -36,7 +36,7 @@ pub(super) fn show(plan: &RunPlan, format: Format) -> Result<Exit, Problem> {
 pub(super) fn validated(effective: &Effective, library: &Library) -> Result<String, Vec<Diagnostic>> {
     let pack = tck_run::pack_of(library, effective).map_err(|wrong| vec![wrong])?;
     let surroundings = Surroundings::of_process();
-    let mut run = SocketRun::of_profile(effective, library, &pack, &surroundings, Place::default())?;
+    let mut run = LiveRun::of_profile(effective, library, &pack, &surroundings, ProfileContext::default())?;
     let wrong = |error: RunError| vec![effective.complain("bench.broker", "broker", error.to_string(), "this one")];
     run.overhear(&pack).map_err(wrong)?;
     let layout = run.device.layout.as_ref().map_or("no layout".to_owned(), |layout| {

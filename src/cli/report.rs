@@ -34,7 +34,7 @@ pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem
         return super::audited::report(folder, arguments, outputs);
     }
     if arguments.certificate {
-        return super::papers::certificate(folder);
+        return super::export::certificate(folder);
     }
     if let Some(number) = arguments.message {
         return message(folder, number, arguments.format);
@@ -42,10 +42,10 @@ pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem
     let mut library = crate::assets::library(arguments.suites.own())?;
     library.add(&own_tests(folder)?)?;
     if !arguments.renderings.is_empty() {
-        return super::papers::rendered(folder, &library, arguments, outputs);
+        return super::export::rendered(folder, &library, arguments, outputs);
     }
     if arguments.attestation {
-        return super::papers::attestation(folder, &library);
+        return super::export::attestation(folder, &library);
     }
     let path = file::find(folder);
     let Recording { mut journal, torn } = journal_of(&path)?;

@@ -3,7 +3,7 @@
 use std::io;
 use std::time::Duration;
 
-use crate::ui::{Desk, Heartbeat, Progress as _, RunTitle, Terminal, TerminalOptions, TestLine};
+use crate::ui::{Heartbeat, Progress as _, Prompter, RunTitle, Terminal, TerminalOptions, TestLine};
 use tck_base::verdict::{Outcome, Verdict};
 use tck_engine::Watcher;
 use tck_journal::event::{Gate, Plan};
@@ -17,7 +17,7 @@ pub struct Screen {
     terminal: Terminal<io::Stdout, io::Stderr>,
     title: RunTitle,
     show: Show,
-    desk: Desk,
+    desk: Prompter,
     /// Where no bar shows that it goes on.
     heartbeat: Option<Heartbeat>,
 }
@@ -36,7 +36,7 @@ pub enum Show {
 impl Screen {
     /// A screen for a device, beside the desk of a person.
     #[must_use]
-    pub fn new(device: String, protocol: String, show: Show, desk: Desk) -> Self {
+    pub fn new(device: String, protocol: String, show: Show, desk: Prompter) -> Self {
         let options = TerminalOptions {
             results: show != Show::Nothing,
             ..TerminalOptions::of_process()

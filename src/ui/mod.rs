@@ -1,6 +1,6 @@
 //! The terminal: one line per test on standard output, what is awaited on standard error.
 //!
-//! [`Progress`] is what a run tells; [`Terminal`] shows it, and a [`Desk`] is where a person is asked. Texts of the device are shown
+//! [`Progress`] is what a run tells; [`Terminal`] shows it, and a [`Prompter`] is where a person is asked. Texts of the device are shown
 //! escaped, because they may hold anything. What is told is decided elsewhere.
 
 mod full_screen;
@@ -20,6 +20,6 @@ pub use hook::hook;
 pub use listing::{faults, hooks, tolerances, vehicle_words};
 pub use output::{Output, escaped};
 pub use progress::{Progress, RunTitle, TestLine};
-pub use prompt::{Desk, Follower, put_terminal_back};
+pub use prompt::{Follower, Prompter, put_terminal_back};
 pub use terminal::{Terminal, TerminalOptions};
 pub use watching::{LineOptions, Lines};

@@ -20,7 +20,7 @@ const GLANCE: Duration = Duration::from_millis(50);
 
 /// The place where a person is asked, and what is asked about. Copies are the same place.
 #[derive(Clone, Debug)]
-pub struct Desk {
+pub struct Prompter {
     shared: Arc<Shared>,
 }
 
@@ -59,7 +59,7 @@ struct About {
     step: Option<String>,
 }
 
-impl Desk {
+impl Prompter {
     /// A place where nothing is drawn otherwise. `stop` is told when the person wants the run to end.
     #[must_use]
     pub fn new(stop: watch::Sender<bool>) -> Self {
@@ -160,7 +160,7 @@ fn wanted_of(about: &About, what: &str) -> String {
     text
 }
 
-impl Person for Desk {
+impl Person for Prompter {
     fn ask(&self, what: &str, within: Duration, wanted: &Wanted) -> Answer {
         let _alone = held(&self.shared.terminal);
         let about = held(&self.shared.about).clone();
@@ -358,24 +358,24 @@ mod tests {
 
     #[test]
     fn a_question_says_which_test_and_what_to_do_and_how_long() {
-        let desk = Desk::new(watch::channel(false).0);
+        let desk = Prompter::new(watch::channel(false).0);
         desk.runs("state/emergency-stop");
         desk.performs(Some("The operator stops it"));
         let about = held(&desk.shared.about).clone();
-        let heading = Desk::heading(1, &about, "Press an emergency stop.\u{1b}[2J");
+        let heading = Prompter::heading(1, &about, "Press an emergency stop.\u{1b}[2J");
         assert_eq!(
             console::strip_ansi_codes(&heading),
             "\r\n-- question 1, test state/emergency-stop --\r\n   The operator stops it\r\n   Press an emergency \
              stop.\\u{1b}[2J\r\n"
         );
-        assert!(Desk::heading(2, &about, "Release it.").contains("question 2"));
+        assert!(Prompter::heading(2, &about, "Release it.").contains("question 2"));
         assert!(keys(Duration::from_secs(598)).ends_with("9:58 left "));
     }
 
     #[test]
     fn once_the_run_ends_nobody_is_kept_waiting() {
         let (stop, _keep) = watch::channel(true);
-        let asked = Desk::new(stop).ask(
+        let asked = Prompter::new(stop).ask(
             "Release the emergency stop.",
             Duration::from_secs(600),
             &Wanted::default(),

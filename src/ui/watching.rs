@@ -10,8 +10,8 @@ use super::output::Output;
 use tck_base::verdict::Verdict;
 use tck_report::clean::{line, short};
 use tck_watch::alarm::Alarmed;
-use tck_watch::glance::Glance;
 use tck_watch::session::{Contact, Happening, Viewer};
+use tck_watch::vehicle_status::VehicleStatus;
 use tck_watch::{Notice, Watch};
 
 /// How much of a message is shown beside a finding, in characters.
@@ -209,7 +209,7 @@ fn object(notice: &Notice) -> Value {
 
 /// How things are with a vehicle, on one line.
 #[must_use]
-pub fn summary(glance: &Glance) -> String {
+pub fn summary(glance: &VehicleStatus) -> String {
     let known = |text: &Option<String>| line(text.as_deref().unwrap_or("-")).into_owned();
     let order = match &glance.order {
         None => "no order".to_owned(),
@@ -231,7 +231,7 @@ pub fn summary(glance: &Glance) -> String {
     )
 }
 
-fn summary_object(glance: &Glance) -> Value {
+fn summary_object(glance: &VehicleStatus) -> Value {
     json!({
         "kind": "vehicle",
         "manufacturer": glance.manufacturer,

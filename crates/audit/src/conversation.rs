@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::Scene;
+use super::AuditContext;
 use super::arrived::{Arrived, is_at_rest, of_side, timestamp};
 use super::continuity::{Continuity, Step};
 use super::result::SideResult;
@@ -65,7 +65,7 @@ impl Conversation {
     }
 
     /// Shows a message to both sides.
-    pub fn show(&mut self, arrived: &Arrived, scene: Scene<'_>) {
+    pub fn show(&mut self, arrived: &Arrived, scene: AuditContext<'_>) {
         let Some(pack) = self.pack.clone() else { return };
         let Some(rule) = pack.topic(&arrived.name) else { return };
         let publisher = rule.publisher;
@@ -133,7 +133,7 @@ impl Conversation {
     }
 
     /// What came out. Another conversation may begin.
-    pub fn conclude(&mut self, scene: Scene<'_>) -> Concluded {
+    pub fn conclude(&mut self, scene: AuditContext<'_>) -> Concluded {
         let Self {
             pack,
             sides,

@@ -3,54 +3,54 @@
 //! [`Audit`] is shown message after message and finds vehicles by their topics. Each vehicle, and the master control
 //! that commands it, is judged by itself, by the protocol version its messages name. What a recording cannot show is
 //! not judged: it may begin in the middle, lack messages, hold them twice, or hold what was retained yesterday. [`scope`]
-//! says which monitor is used how, [`continuity`] finds the holes, and [`arrival`] puts messages back into their order.
+//! says which monitor is used how, [`continuity`] finds the holes, and [`dedup`] puts messages back into their order.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
-mod arrival;
 mod arrived;
 pub mod bundle;
-mod cause;
 mod continuity;
 mod conversation;
-pub mod crew;
+mod dedup;
 pub mod export;
+mod finding_group;
 mod header;
 mod hint;
+mod message_check;
 mod misnamed;
-mod news;
+mod mqtt_sessions;
+mod new_findings;
 mod outcome;
 mod own_run;
 pub mod page;
+pub mod pool;
 mod redact;
 pub mod result;
 pub mod saved;
 mod side;
-mod single;
 pub mod slice;
 pub mod time_line;
 mod topics;
 mod vehicle;
-mod wires;
 
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
-use tck_capture::{Message, Place, Told, Wire, WireEvent};
+use tck_capture::{Message, SourcePosition, Told, Wire, WireEvent};
 use tck_journal::event::Packet;
 use tck_judge::Rules;
 use tck_suite::model::Monitor;
 
 pub use hint::{Hint, Hints};
+pub use message_check::{Flaw, single};
 use misnamed::Misnamed;
-pub use news::{Address, Found};
+use mqtt_sessions::{MqttSessions, Publisher};
+pub use new_findings::{Address, Found};
 pub use own_run::{OwnRunError, own_run};
 pub use redact::Redactor;
 use result::{AuditResult, RESULT_FORMAT, Recording, Whence};
-pub use single::{Flaw, single};
 use topics::{Beside, Named, Topics};
 use vehicle::Vehicle;
-use wires::{Publisher, Wires};
 
 /// How many vehicles are judged; messages of further ones are counted.
 const VEHICLES: usize = 10_000;
@@ -120,7 +120,7 @@ fn is_command(name: &str) -> bool {
 
 /// What all vehicles share.
 #[derive(Clone, Copy)]
-struct Scene<'a> {
+struct AuditContext<'a> {
     rules: &'a Rules,
     options: &'a Options,
     places: &'a Whence,
@@ -136,7 +136,7 @@ pub struct Audit<'r> {
     options: Options,
     topics: Topics,
     vehicles: BTreeMap<String, Vehicle>,
-    wires: Wires,
+    wires: MqttSessions,
     messages: u64,
     elsewhere: u64,
     beyond: u64,
@@ -181,7 +181,7 @@ impl<'r> Audit<'r> {
             rules,
             options,
             vehicles: BTreeMap::new(),
-            wires: Wires::default(),
+            wires: MqttSessions::default(),
             messages: 0,
             elsewhere: 0,
             beyond: 0,
@@ -247,7 +247,7 @@ impl<'r> Audit<'r> {
             self.elsewhere += 1;
             return;
         }
-        let place: Place = message.place;
+        let place: SourcePosition = message.place;
         self.places.note(self.messages, place);
         if !self.vehicles.contains_key(&named.key) {
             if self.vehicles.len() >= VEHICLES {
@@ -258,7 +258,7 @@ impl<'r> Audit<'r> {
                 .insert(named.key.clone(), Vehicle::new(&named, message.at.is_some()));
         }
         if let Some(vehicle) = self.vehicles.get_mut(&named.key) {
-            let scene = Scene {
+            let scene = AuditContext {
                 rules: self.rules,
                 options: &self.options,
                 places: &self.places,
@@ -324,7 +324,7 @@ impl<'r> Audit<'r> {
             topic: &named.name,
             elsewhere,
         });
-        let scene = Scene {
+        let scene = AuditContext {
             rules: self.rules,
             options: &self.options,
             places: &self.places,
@@ -346,7 +346,7 @@ impl<'r> Audit<'r> {
 
     /// Nothing was seen for a while: nobody knows what every vehicle did meanwhile.
     fn interrupted(&mut self) {
-        let scene = Scene {
+        let scene = AuditContext {
             rules: self.rules,
             options: &self.options,
             places: &self.places,
@@ -364,7 +364,7 @@ impl<'r> Audit<'r> {
     /// The result; the recording is at its end.
     #[must_use]
     pub fn finish(mut self, recordings: Vec<Recording>) -> AuditResult {
-        let scene = Scene {
+        let scene = AuditContext {
             rules: self.rules,
             options: &self.options,
             places: &self.places,
@@ -400,10 +400,10 @@ impl<'r> Audit<'r> {
 }
 
 #[cfg(test)]
+mod mqtt_sessions_tests;
+#[cfg(test)]
 mod result_tests;
 #[cfg(test)]
 mod site_tests;
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod wires_tests;

@@ -9,7 +9,7 @@ use tck_base::verdict::Verdict;
 use tck_capture::{Item, Recorded};
 use tck_journal::Entry;
 use tck_journal::event::{Event, Record, RunHeader};
-use tck_judge::{JudgeError, Observed, Rules, SideJudge};
+use tck_judge::{JudgeError, Observed, Rules, TrafficJudge};
 use tck_pack::Role;
 
 /// Why the journal of a run cannot be judged.
@@ -38,7 +38,8 @@ pub fn own_run(
         Event::RunBegun { header } => (**header).clone(),
         _ => return Err(JudgeError::NoHeader.into()),
     };
-    let mut judge = SideJudge::begin(rules, &header, &|monitor| options.wants_monitor(monitor))?.among_others(&header);
+    let mut judge =
+        TrafficJudge::begin(rules, &header, &|monitor| options.wants_monitor(monitor))?.among_others(&header);
     let mut found: BTreeMap<(String, String, Verdict), FindingResult> = BTreeMap::new();
     let mut messages = BTreeMap::new();
     let mut keep = |all: Vec<Observed>, at: jiff::Timestamp| {

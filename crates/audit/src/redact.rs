@@ -199,7 +199,7 @@ mod tests {
             payload: payload.to_string().into(),
             qos: None,
             retain: None,
-            place: tck_capture::Place::default(),
+            place: tck_capture::SourcePosition::default(),
             after_gap: false,
             carried: None,
         };

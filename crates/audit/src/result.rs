@@ -5,10 +5,10 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::cause;
+use super::finding_group;
 use super::time_line::TimeLine;
 use tck_base::verdict::{Accumulated, Verdict};
-use tck_capture::{Counted, Place};
+use tck_capture::{Counted, SourcePosition};
 use tck_pack::Role;
 use tck_report::manifest::digest;
 
@@ -372,7 +372,7 @@ impl SideResult {
     pub fn mistakes(&self) -> Vec<Mistake<'_>> {
         let mut all: Vec<Mistake<'_>> = Vec::new();
         for finding in &self.findings {
-            let about = |finding: &FindingResult| (finding.message, cause::place(&finding.text).to_owned());
+            let about = |finding: &FindingResult| (finding.message, finding_group::place(&finding.text).to_owned());
             match all.iter_mut().find(|known| about(known.worst) == about(finding)) {
                 Some(known) => {
                     let is_more = finding.verdict == known.worst.verdict && finding.text.len() > known.worst.text.len();
@@ -516,10 +516,10 @@ fn verdict_of(vehicles: &[VehicleResult]) -> Option<Verdict> {
 
 /// Where the last messages stand.
 #[derive(Debug, Default)]
-pub struct Whence(VecDeque<(u64, Place)>);
+pub struct Whence(VecDeque<(u64, SourcePosition)>);
 
 impl Whence {
-    pub(super) fn note(&mut self, message: u64, place: Place) {
+    pub(super) fn note(&mut self, message: u64, place: SourcePosition) {
         if self.0.len() == PLACES {
             self.0.pop_front();
         }
@@ -527,7 +527,7 @@ impl Whence {
     }
 
     /// Where a message stands, if that is still known.
-    pub(super) fn of(&self, message: u64) -> Option<Place> {
+    pub(super) fn of(&self, message: u64) -> Option<SourcePosition> {
         let at = self.0.binary_search_by_key(&message, |(number, _)| *number).ok()?;
         self.0.get(at).map(|(_, place)| *place)
     }

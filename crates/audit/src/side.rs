@@ -4,15 +4,15 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use super::arrived::Arrived;
-use super::news::Found;
+use super::new_findings::Found;
 use super::outcome::Outcome;
 use super::result::{FindingResult, SideResult, Stretch, Undecided, Whereabouts};
-use super::{Scene, cause};
+use super::{AuditContext, finding_group};
 use tck_base::clock::{Moment, Stamp};
 use tck_base::verdict::Verdict;
 use tck_journal::Entry;
 use tck_journal::event::{Event, Record, RunHeader, Source};
-use tck_judge::{Observed, SideJudge};
+use tck_judge::{Observed, TrafficJudge};
 use tck_pack::{Pack, Role};
 use tck_report::clean::short;
 use tck_result::MonitorFinding;
@@ -77,9 +77,9 @@ pub(super) struct Side {
     /// Whether the recording says when messages came.
     timed: bool,
     begun: Stamp,
-    each: SideJudge,
+    each: TrafficJudge,
     /// Those that need an unbroken record, from where it is one.
-    unbroken: Option<SideJudge>,
+    unbroken: Option<TrafficJudge>,
     kept: BTreeMap<Key, FindingResult>,
     /// What holds only if nothing turns out to be missing: since when, and what.
     open: VecDeque<(Moment, Observed, jiff::Timestamp, Arc<Entry>)>,
@@ -103,7 +103,7 @@ pub(super) struct Side {
 
 impl Side {
     /// Begins; `None` when the rules have no such side.
-    pub fn begin(role: Role, header: RunHeader, begun: Stamp, timed: bool, scene: Scene<'_>) -> Option<Self> {
+    pub fn begin(role: Role, header: RunHeader, begun: Stamp, timed: bool, scene: AuditContext<'_>) -> Option<Self> {
         let mut each = start(&header, scene, &judges_each_message)?;
         each.observe(&first(&header, begun));
         Some(Self {
@@ -144,7 +144,7 @@ impl Side {
     }
 
     /// Counts a message of this side, and whether it is held against those before it.
-    pub fn note(&mut self, arrived: &Arrived, scene: Scene<'_>) {
+    pub fn note(&mut self, arrived: &Arrived, scene: AuditContext<'_>) {
         self.spoke |= matches!(arrived.name.as_str(), "state" | "order" | "instantActions");
         if arrived.stale {
             return;
@@ -184,7 +184,7 @@ impl Side {
     }
 
     /// From here on nothing is missing, as far as can be told.
-    pub fn mended(&mut self, scene: Scene<'_>) {
+    pub fn mended(&mut self, scene: AuditContext<'_>) {
         if self.unbroken.is_some() {
             return;
         }
@@ -201,14 +201,14 @@ impl Side {
     }
 
     /// Nothing was missing up to here.
-    pub fn confirmed(&mut self, scene: Scene<'_>) {
+    pub fn confirmed(&mut self, scene: AuditContext<'_>) {
         while let Some((_, observed, utc, entry)) = self.open.pop_front() {
             self.keep(observed, utc, Some(&entry), scene);
         }
     }
 
     /// Shows it a message.
-    pub fn observe(&mut self, entry: &Arc<Entry>, utc: jiff::Timestamp, scene: Scene<'_>) {
+    pub fn observe(&mut self, entry: &Arc<Entry>, utc: jiff::Timestamp, scene: AuditContext<'_>) {
         for observed in self.each.observe(entry) {
             self.keep(observed, utc, Some(entry), scene);
         }
@@ -227,7 +227,7 @@ impl Side {
     }
 
     /// Counts a finding, made at this entry.
-    fn keep(&mut self, observed: Observed, utc: jiff::Timestamp, entry: Option<&Arc<Entry>>, scene: Scene<'_>) {
+    fn keep(&mut self, observed: Observed, utc: jiff::Timestamp, entry: Option<&Arc<Entry>>, scene: AuditContext<'_>) {
         let Observed { monitor, finding } = observed;
         let key = self.key(&monitor, &finding);
         let last = format!("{utc:.3}");
@@ -287,7 +287,7 @@ impl Side {
     }
 
     /// Takes over what was found of its connections.
-    pub fn wired(&mut self, outcome: Outcome, scene: Scene<'_>) {
+    pub fn wired(&mut self, outcome: Outcome, scene: AuditContext<'_>) {
         for (id, judged) in outcome.judged {
             *self.judged.entry(id).or_default() += judged;
         }
@@ -300,7 +300,7 @@ impl Side {
     /// What a finding is counted with: others of the same cause, or all others where there are too many causes.
     fn key(&self, monitor: &str, finding: &MonitorFinding) -> Key {
         let group = (monitor.to_owned(), finding.requirement.clone(), finding.verdict);
-        let key = (group, cause::of(&finding.message));
+        let key = (group, finding_group::of(&finding.message));
         let causes = self.kept.range((key.0.clone(), String::new())..);
         let causes = causes.take_while(|(known, _)| known.0 == key.0).count();
         if self.kept.contains_key(&key) || causes < CAUSES {
@@ -309,7 +309,7 @@ impl Side {
         (key.0, String::new())
     }
 
-    fn absorb(&mut self, judge: &SideJudge) {
+    fn absorb(&mut self, judge: &TrafficJudge) {
         for (id, judged) in judge.judged() {
             *self.judged.entry(id).or_default() += judged;
         }
@@ -317,7 +317,7 @@ impl Side {
     }
 
     /// What came out.
-    pub fn finish(mut self, scene: Scene<'_>) -> SideResult {
+    pub fn finish(mut self, scene: AuditContext<'_>) -> SideResult {
         // What is found at the very end may be explained by what comes next.
         self.open.clear();
         if let Some(judge) = self.unbroken.take() {
@@ -365,9 +365,13 @@ fn judges_each_message(monitor: &Monitor) -> bool {
     matches!(monitor.recordings, Recordings::Message | Recordings::MessageOnTopic)
 }
 
-pub(super) fn start(header: &RunHeader, scene: Scene<'_>, used: &dyn Fn(&Monitor) -> bool) -> Option<SideJudge> {
+pub(super) fn start(
+    header: &RunHeader,
+    scene: AuditContext<'_>,
+    used: &dyn Fn(&Monitor) -> bool,
+) -> Option<TrafficJudge> {
     let wanted = |monitor: &Monitor| used(monitor) && scene.options.wants_monitor(monitor);
-    SideJudge::begin(scene.rules, header, &wanted).ok()
+    TrafficJudge::begin(scene.rules, header, &wanted).ok()
 }
 
 /// The record that every journal begins with.
@@ -384,7 +388,7 @@ pub(super) fn first(header: &RunHeader, at: Stamp) -> Arc<Entry> {
 }
 
 /// The monitors that are meant for this side and version, and wanted.
-fn of_side<'s>(scene: Scene<'s>, role: Role, header: &RunHeader) -> impl Iterator<Item = &'s Arc<Monitor>> {
+fn of_side<'s>(scene: AuditContext<'s>, role: Role, header: &RunHeader) -> impl Iterator<Item = &'s Arc<Monitor>> {
     let pack: Option<&Arc<Pack>> = scene.rules.packs.get(&header.protocol);
     let version = pack.map(|pack| pack.version);
     let monitors = scene.rules.suites.monitors.iter();

@@ -15,7 +15,7 @@ fn message(told: SiteMessage) -> Message {
         payload: told.payload.into(),
         qos: Some(told.qos),
         retain: Some(false),
-        place: Place::default(),
+        place: SourcePosition::default(),
         after_gap: false,
         carried: None,
     }

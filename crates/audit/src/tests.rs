@@ -33,7 +33,7 @@ pub(super) fn traffic(library: &Library, pack: &Pack, role: Role, tests: &str, f
             payload: payload.clone(),
             qos: Some(0),
             retain: Some(*retain && !sent),
-            place: Place::default(),
+            place: SourcePosition::default(),
             after_gap: false,
             carried: None,
         });
@@ -309,7 +309,7 @@ fn a_version_without_rules_is_named_and_not_judged() {
         payload: bytes::Bytes::copy_from_slice(payload.as_bytes()),
         qos: None,
         retain: Some(false),
-        place: Place::default(),
+        place: SourcePosition::default(),
         after_gap: false,
         carried: None,
     };

@@ -5,13 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::Scene;
-use super::arrival::{Known, Sorted};
+use super::AuditContext;
 use super::arrived::{Arrived, timestamp, version};
 use super::conversation::{Concluded, Conversation};
+use super::dedup::{Known, Sorted};
 use super::header::header;
 use super::hint::{Hint, Hints};
-use super::news::Found;
+use super::new_findings::Found;
 use super::outcome::Outcome;
 use super::result::{HintResult, VehicleResult, Whereabouts};
 use super::side::Side;
@@ -21,7 +21,7 @@ use tck_base::clock::{Moment, Stamp};
 use tck_capture::Message;
 use tck_journal::event::{Event, Record, RunHeader, Source};
 use tck_journal::{Entry, Payload};
-use tck_pack::{Pack, Role, Said};
+use tck_pack::{Pack, Role, VersionClaim};
 use tck_view::{MessageView, Names, Topic};
 
 /// How many messages wait until the vehicle has said which version it speaks.
@@ -107,7 +107,7 @@ impl Vehicle {
     }
 
     /// Takes in a message; says whether it was worth something.
-    pub fn observe(&mut self, number: u64, name: &str, message: Message, scene: Scene<'_>) -> bool {
+    pub fn observe(&mut self, number: u64, name: &str, message: Message, scene: AuditContext<'_>) -> bool {
         if self.is_copy(name, &message) {
             return false;
         }
@@ -193,7 +193,7 @@ impl Vehicle {
     }
 
     /// Takes over what was found of a connection.
-    pub fn wired(&mut self, role: Role, outcome: Outcome, scene: Scene<'_>) {
+    pub fn wired(&mut self, role: Role, outcome: Outcome, scene: AuditContext<'_>) {
         if let Some(side) = self.conversation.sides_mut().find(|side| side.role == role) {
             self.wired = true;
             side.wired(outcome, scene);
@@ -201,7 +201,7 @@ impl Vehicle {
     }
 
     /// Nothing was seen for a while.
-    pub fn interrupted(&mut self, scene: Scene<'_>) {
+    pub fn interrupted(&mut self, scene: AuditContext<'_>) {
         for arrived in self.held() {
             self.pass(arrived, scene);
         }
@@ -239,7 +239,7 @@ impl Vehicle {
     }
 
     /// A message whose turn it is.
-    fn pass(&mut self, arrived: Arrived, scene: Scene<'_>) {
+    fn pass(&mut self, arrived: Arrived, scene: AuditContext<'_>) {
         if let Some(message) = arrived.message(self.names(scene)).filter(|_| !arrived.stale) {
             self.time_line.note(message, arrived.at.utc);
         }
@@ -263,7 +263,7 @@ impl Vehicle {
 
     /// Whether the vehicle speaks another version from this message on: it is back with other software. Where its count
     /// goes on as if nothing had been, the version of the message is wrong instead.
-    fn is_updated(&self, arrived: &Arrived, scene: Scene<'_>) -> bool {
+    fn is_updated(&self, arrived: &Arrived, scene: AuditContext<'_>) -> bool {
         let is_command = matches!(arrived.name.as_str(), "order" | "instantActions");
         let is_told = scene.options.protocol.is_some();
         if arrived.stale || is_command || is_told || self.earlier.len() >= STRETCHES {
@@ -275,18 +275,20 @@ impl Vehicle {
         let Some(said) = version(message) else { return false };
         let is_other = match (self.conversation.pack(), &self.foreign) {
             (Some(pack), _) => match scene.rules.packs.said(&said) {
-                Said::Known(said) => said.version != pack.version,
-                Said::Unknown(_) => true,
-                Said::NoVersion => false,
+                VersionClaim::Known(said) => said.version != pack.version,
+                VersionClaim::Unknown(_) => true,
+                VersionClaim::NoVersion => false,
             },
-            (None, Some(foreign)) => said != *foreign && !matches!(scene.rules.packs.said(&said), Said::NoVersion),
+            (None, Some(foreign)) => {
+                said != *foreign && !matches!(scene.rules.packs.said(&said), VersionClaim::NoVersion)
+            }
             (None, None) => false,
         };
         is_other && !self.conversation.goes_on(&arrived.name, message)
     }
 
     /// Finds the version, and judges what waited for it.
-    fn settle(&mut self, scene: Scene<'_>, at_last: bool) {
+    fn settle(&mut self, scene: AuditContext<'_>, at_last: bool) {
         let names = self.names(scene);
         let commands = |arrived: &&Arrived| matches!(arrived.name.as_str(), "order" | "instantActions");
         let (sent, said): (Vec<&Arrived>, Vec<&Arrived>) = self.waiting.iter().partition(commands);
@@ -300,7 +302,7 @@ impl Vehicle {
             return;
         };
         let packs = &scene.rules.packs;
-        let worth = |text: &&String| !matches!(packs.said(text), Said::NoVersion);
+        let worth = |text: &&String| !matches!(packs.said(text), VersionClaim::NoVersion);
         let told = scene.options.protocol.as_ref().and_then(|version| packs.get(version));
         let pack = match (told, versions.iter().find(worth), versions.first()) {
             (Some(pack), ..) => pack,
@@ -326,13 +328,13 @@ impl Vehicle {
         }
     }
 
-    fn show(&mut self, arrived: &Arrived, scene: Scene<'_>) {
+    fn show(&mut self, arrived: &Arrived, scene: AuditContext<'_>) {
         self.look(arrived, scene);
         self.conversation.show(arrived, scene);
     }
 
     /// Looks for slips that are allowed. Who asks for certain monitors knows what he wants to see.
-    fn look(&mut self, arrived: &Arrived, scene: Scene<'_>) {
+    fn look(&mut self, arrived: &Arrived, scene: AuditContext<'_>) {
         let (Some(pack), Some(message), true) = (
             self.conversation.pack(),
             arrived.entry.json(),
@@ -381,7 +383,7 @@ impl Vehicle {
     }
 
     /// What members of its messages are called: by the version it speaks, as far as that is known.
-    fn names<'s>(&'s self, scene: Scene<'s>) -> &'s Names {
+    fn names<'s>(&'s self, scene: AuditContext<'s>) -> &'s Names {
         let pack = self.conversation.pack();
         pack.unwrap_or_else(|| scene.rules.packs.latest()).names()
     }
@@ -392,7 +394,7 @@ impl Vehicle {
     }
 
     /// Nothing comes any more that would say which version it speaks.
-    pub fn ready(&mut self, scene: Scene<'_>) {
+    pub fn ready(&mut self, scene: AuditContext<'_>) {
         for arrived in self.held() {
             self.pass(arrived, scene);
         }
@@ -402,7 +404,7 @@ impl Vehicle {
     }
 
     /// What came out, version by version.
-    pub fn finish(mut self, scene: Scene<'_>) -> Vec<VehicleResult> {
+    pub fn finish(mut self, scene: AuditContext<'_>) -> Vec<VehicleResult> {
         self.ready(scene);
         let last = self.conclude(scene);
         self.earlier.push(last);
@@ -410,7 +412,7 @@ impl Vehicle {
     }
 
     /// What came out since the vehicle speaks this version.
-    fn conclude(&mut self, scene: Scene<'_>) -> VehicleResult {
+    fn conclude(&mut self, scene: AuditContext<'_>) -> VehicleResult {
         if self.conversation.pack().is_none() && self.foreign.is_none() {
             self.settle(scene, true);
         }

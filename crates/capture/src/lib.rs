@@ -9,6 +9,7 @@
 #![warn(missing_docs)]
 
 mod clock_text;
+pub mod from_journal;
 pub mod input;
 mod lines;
 mod mcap;
@@ -19,7 +20,6 @@ pub(crate) mod packets;
 mod payload;
 mod recorded;
 mod table;
-pub mod taped;
 mod wide;
 
 use bytes::Bytes;
@@ -34,7 +34,7 @@ use tck_journal::event::{Close, Packet};
 
 /// Where a message stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Place {
+pub struct SourcePosition {
     /// Number of the recording, counted from 0.
     pub file: usize,
     /// Line, counted from 1.
@@ -55,7 +55,7 @@ pub struct Message {
     /// RETAIN of the delivery, if the recording says so.
     pub retain: Option<bool>,
     /// Where it stands.
-    pub place: Place,
+    pub place: SourcePosition,
     /// Whether the recorder says that it saw nothing for a while before this message.
     pub after_gap: bool,
     /// The connection it came by, where packets were captured.

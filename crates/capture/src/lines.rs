@@ -15,7 +15,7 @@ use super::members::{Depth, elements, members};
 use super::names::{self, Part};
 use super::payload::bytes_of;
 use super::table::Table;
-use super::{Item, Mapping, Message, Place, clock_text};
+use super::{Item, Mapping, Message, SourcePosition, clock_text};
 use tck_journal::Record;
 use tck_journal::event::PAYLOAD_LIMIT;
 
@@ -96,8 +96,8 @@ impl Lines {
 
     /// Where the last line stands.
     #[must_use]
-    pub fn place(&self) -> Place {
-        Place {
+    pub fn place(&self) -> SourcePosition {
+        SourcePosition {
             file: self.file,
             line: self.counted.lines,
         }
@@ -330,7 +330,7 @@ impl Lines {
     }
 
     /// What an object holds: a record, a message, or a list of messages.
-    fn objects(&self, text: &str, place: Place) -> Vec<Item> {
+    fn objects(&self, text: &str, place: SourcePosition) -> Vec<Item> {
         let Some(all) = members(text) else { return Vec::new() };
         let has = |name: &str| all.iter().any(|(known, _)| known == name);
         if self.mapping == Mapping::default() && has("seq") && has("event") {
@@ -353,7 +353,7 @@ impl Lines {
         messages.collect()
     }
 
-    fn message(&self, text: &str, all: &[(String, &str)], place: Place) -> Option<Message> {
+    fn message(&self, text: &str, all: &[(String, &str)], place: SourcePosition) -> Option<Message> {
         let named = |part: Part| match part.mapped(&self.mapping) {
             Some(path) => at_path(text, path).map(|value| (path, value)),
             None => part.usual().iter().find_map(|usual| {

@@ -11,7 +11,7 @@ use std::io::{self, BufRead, Cursor, Read as _};
 use bytes::Bytes;
 
 use super::members::members;
-use super::{Counted, Item, Message, Place, Read};
+use super::{Counted, Item, Message, Read, SourcePosition};
 
 /// What a file begins with.
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
@@ -71,8 +71,8 @@ impl Mcap {
 
     /// Which message was read last.
     #[must_use]
-    pub fn place(&self) -> Place {
-        Place {
+    pub fn place(&self) -> SourcePosition {
+        SourcePosition {
             file: self.file,
             line: self.counted.lines,
         }

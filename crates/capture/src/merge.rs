@@ -3,7 +3,7 @@
 //! Each recording is taken as it stands; of all the next ones the earliest comes first. What has no time comes at once,
 //! so that a recording without times is read to its end before the next one.
 
-use super::{CaptureError, Carried, Counted, Item, Message, Recorded, Told, taped};
+use super::{CaptureError, Carried, Counted, Item, Message, Recorded, Told, from_journal};
 use tck_journal::event::{Event, Record, Source as RecordSource};
 
 /// A recording with its name.
@@ -107,7 +107,7 @@ impl Source {
                     if let Event::RunBegun { header } = &record.event {
                         self.tapped = header.vantage == "tap";
                     }
-                    let seen = taped::wire(
+                    let seen = from_journal::wire(
                         record.at.utc,
                         record.source,
                         record.direction,
@@ -115,7 +115,7 @@ impl Source {
                         place.file,
                     );
                     if let Some(wire) = seen {
-                        self.ahead = taped::carried(&wire, place).map(Told::Message);
+                        self.ahead = from_journal::carried(&wire, place).map(Told::Message);
                         break Some(Told::Wire(wire));
                     }
                     if let Event::Message {

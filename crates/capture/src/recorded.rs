@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use super::{CaptureError, Counted, Item, Lines, Mapping, Mcap, Packets, Place, Read, input, mcap, packets};
+use super::{CaptureError, Counted, Item, Lines, Mapping, Mcap, Packets, Read, SourcePosition, input, mcap, packets};
 
 /// One recording, whatever its form.
 pub struct Recorded {
@@ -103,7 +103,7 @@ impl Recorded {
 
     /// Where the last of it stands.
     #[must_use]
-    pub fn place(&self) -> Place {
+    pub fn place(&self) -> SourcePosition {
         match &self.form {
             Form::Lines(lines) => lines.place(),
             Form::Packets(packets) => packets.place(),

@@ -4,7 +4,7 @@ use csv::{ByteRecord, ReaderBuilder};
 
 use super::names::{self, Part};
 use super::payload::bytes_of_text;
-use super::{Mapping, Message, Place, clock_text};
+use super::{Mapping, Message, SourcePosition, clock_text};
 
 /// What stands between columns.
 const DELIMITERS: [u8; 3] = *b",;\t";
@@ -55,7 +55,7 @@ impl Table {
     }
 
     /// The message in a row.
-    pub fn message(&self, row: &[u8], place: Place) -> Option<Message> {
+    pub fn message(&self, row: &[u8], place: SourcePosition) -> Option<Message> {
         let fields = fields(row, self.delimiter)?;
         let text = |column: usize| std::str::from_utf8(fields.get(column)?).ok();
         let topic = text(self.topic)?.trim();

@@ -7,9 +7,9 @@ use std::sync::Arc;
 
 use serde_json::{Map, Value, json};
 
+use super::compose_error::ComposeError;
 use super::ids::IdForm;
 use super::route::{RouteBuilder, SentOrders};
-use super::unmade::ComposeError;
 use tck_base::clock::Stamp;
 use tck_base::device::Publication;
 use tck_base::pattern::Bindings;

@@ -7,14 +7,14 @@
 #![warn(missing_docs)]
 
 mod compose;
+mod compose_error;
 mod flood;
-mod hands;
 mod ids;
 mod map_file;
 mod operator;
+mod operator_steps;
 mod recorder;
 mod route;
-mod unmade;
 pub mod vehicle;
 
 use std::sync::Arc;
@@ -23,10 +23,10 @@ use std::time::Duration;
 use serde_json::{Map, Value, json};
 
 pub use compose::Composer;
+pub use compose_error::ComposeError;
 pub use ids::IdForm;
 pub use operator::{Asks, HookOutcome, Operator};
 pub use recorder::{RecordError, Recorder};
-pub use unmade::ComposeError;
 
 use tck_base::clock::Moment;
 use tck_base::device::Publication;

@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::unmade::ComposeError;
+use super::compose_error::ComposeError;
 use tck_course::is_station;
 use tck_profile::{Place, SampleKind};
 use tck_suite::model::{Route, RoutePlace};

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Deserialize;
 
-use tck_pack::{Breakage, Ground, Pack, Way};
+use tck_pack::{Breakage, BreakageScope, Pack, Way};
 
 /// Which breakages a stimulus stands for.
 #[derive(Clone, Debug, Deserialize)]
@@ -25,9 +25,9 @@ impl Breaks {
         let Some(schema) = pack.schema(&self.topic) else {
             return Vec::new();
         };
-        let ground = Ground {
+        let ground = BreakageScope {
             elements: self.elements.clone(),
-            ..Ground::default()
+            ..BreakageScope::default()
         };
         let word = |way: Way| Way::ALL.iter().find(|(_, one)| *one == way).map(|(word, _)| *word);
         let header = header(pack);

@@ -10,7 +10,7 @@ use tck_pack::{Catalogue, Mood, Pack, Requirement};
 use tck_result::Decision;
 
 use super::hidden::Open;
-use super::step::{Clause, Holds};
+use super::step::{Clause, ClauseOutcome};
 
 /// The mood of a requirement in this version; `None` when the version does not have it.
 pub(super) fn mood<'a>(catalogue: &'a Catalogue, pack: &Pack, id: &str) -> Option<(&'a Requirement, Mood)> {
@@ -30,12 +30,15 @@ pub(super) fn decide(open: Open, catalogue: &Catalogue, pack: &Pack) -> Option<D
     } = open;
     let (requirement, mood) = mood(catalogue, pack, clause.requirement.as_str())?;
     let verdict = match &clause.holds {
-        Holds::Yes => Verdict::Pass,
-        Holds::Late | Holds::Softly => Verdict::Warning,
-        Holds::No => mood.broken(),
-        Holds::Unseen(_) => Verdict::Inconclusive,
+        ClauseOutcome::Held => Verdict::Pass,
+        ClauseOutcome::HeldLate | ClauseOutcome::Warning => Verdict::Warning,
+        ClauseOutcome::Violated => mood.broken(),
+        ClauseOutcome::Unobservable(_) => Verdict::Inconclusive,
     };
-    let broken = matches!(clause.holds, Holds::No | Holds::Softly | Holds::Late);
+    let broken = matches!(
+        clause.holds,
+        ClauseOutcome::Violated | ClauseOutcome::Warning | ClauseOutcome::HeldLate
+    );
     let explanation = broken.then(|| explain(&clause));
     let (word, place) = (format!("{path}.{}", clause.word), clause.span.place());
     let mut decision = Decision::new(clause.requirement.as_str(), verdict, word, place, clause.message);

@@ -7,7 +7,7 @@
 
 use tck_result::{Sent, Waited};
 
-use super::step::{Clause, Holds, Timing};
+use super::step::{Clause, ClauseOutcome, Timing};
 
 /// A clause of a step that has ended, not decided yet.
 pub(super) struct Open {
@@ -60,12 +60,14 @@ impl Hidden {
             true => shows_nothing,
             false => open.clause.witness.is_none() || open.walks,
         };
-        matches!(open.clause.holds, Holds::No | Holds::Softly | Holds::Late)
-            && is_unseen
+        matches!(
+            open.clause.holds,
+            ClauseOutcome::Violated | ClauseOutcome::Warning | ClauseOutcome::HeldLate
+        ) && is_unseen
             && member == Some(self.member.as_str())
             && !self.decides.iter().any(|id| about.contains(id))
             && self.seq <= open.ended
-            && !(open.refused && open.clause.holds == Holds::No && open.clause.witness.is_none())
+            && !(open.refused && open.clause.holds == ClauseOutcome::Violated && open.clause.witness.is_none())
     }
 }
 
@@ -94,7 +96,7 @@ pub(super) fn hide(all: &mut [Open], hidden: &[Hidden]) -> Option<String> {
             "the messages do not show `{}` as they must (#{}: {} is broken, found by {})",
             hidden.member, hidden.seq, hidden.requirement, hidden.monitor
         );
-        open.clause.holds = Holds::Unseen(why.clone());
+        open.clause.holds = ClauseOutcome::Unobservable(why.clone());
         open.clause.message = format!("cannot be told, since {why}; {}", open.clause.message);
         told.get_or_insert(why);
     }
@@ -121,7 +123,7 @@ mod tests {
                 word: "checks",
                 span: Span::new(&Source::new("test", ""), 0, 0),
                 label: String::new(),
-                holds: Holds::No,
+                holds: ClauseOutcome::Violated,
                 witness: None,
                 message: "nothing came".to_owned(),
                 expected: None,
@@ -151,7 +153,7 @@ mod tests {
             lasting: false,
         }];
         hide(all, &hidden);
-        matches!(all[0].clause.holds, Holds::Unseen(_))
+        matches!(all[0].clause.holds, ClauseOutcome::Unobservable(_))
     }
 
     #[test]

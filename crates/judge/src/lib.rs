@@ -6,43 +6,43 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
-mod company;
+mod clause_outcome;
+mod clients;
+mod conversation_coverage;
 mod decide;
-mod departure;
+mod delivery;
+mod disconnect;
+mod eval_context;
 mod gone;
-mod grounds;
 mod hidden;
-mod holds;
-mod joined;
 mod library;
 mod limit;
-mod mend;
+mod merge;
 mod monitor;
-mod opinions;
+mod monitor_set;
 mod own_errors;
 mod program;
 mod reactions;
+mod repair;
+mod requirement_verdict;
 mod rules;
 mod run;
-mod said;
-mod scene;
+mod run_contexts;
 mod sent;
-mod side;
 mod step;
 mod test;
 mod timeline;
-mod unheard;
-mod watches;
+mod traffic_judge;
 mod window;
 
 pub use gone::{Gone, Sign};
-pub use grounds::Ground;
 pub use library::Library;
 pub use monitor::MonitorJudge;
+pub use monitor_set::Observed;
 pub use rules::{JudgeError, Rules};
 pub use run::{RESULT_FORMAT, RunJudge, judge, judged};
-pub use side::SideJudge;
+pub use run_contexts::Ground;
 pub use step::Progress;
 pub use test::TestJudge;
 pub use timeline::{Timeline, client_of, number_of};
-pub use watches::Observed;
+pub use traffic_judge::TrafficJudge;

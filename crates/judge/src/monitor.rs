@@ -7,10 +7,10 @@ use std::sync::Arc;
 
 use serde_json::Map;
 
+use super::clause_outcome::unbound_text;
 use super::decide::mood;
-use super::grounds::Ground;
 use super::hidden::Hidden;
-use super::holds::unbound_text;
+use super::run_contexts::Ground;
 use super::step::shown_path;
 use tck_base::pattern::{Bindings, Bound, Unbound};
 use tck_base::verdict::{Accumulated, Verdict};

@@ -5,7 +5,7 @@ use tck_journal::Entry;
 use tck_journal::event::{Event, MockVehicle};
 use tck_result::{CommandedVehicle, FleetResult, ReactionTimes};
 
-use super::timeline::Place;
+use super::timeline::TopicOwner;
 
 /// More answers than this are not measured one by one.
 const MOST: usize = 1_000_000;
@@ -41,7 +41,7 @@ impl Reactions {
     }
 
     /// Shows the next entry and whose topic it is about.
-    pub fn observe(&mut self, entry: &Entry, place: &Place) {
+    pub fn observe(&mut self, entry: &Entry, place: &TopicOwner) {
         let Some(vehicle) = self.vehicles.get_mut(place.vehicle) else {
             return;
         };

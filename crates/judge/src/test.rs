@@ -9,14 +9,14 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use super::decide::decide;
-use super::departure::Departure;
+use super::disconnect::Disconnect;
+use super::eval_context::EvalContext;
 use super::gone::Gone;
-use super::grounds::Ground;
 use super::hidden::{Hidden, Open, hide};
 use super::own_errors::{is_refused, reported};
-use super::scene::Scene;
+use super::run_contexts::Ground;
 use super::sent::sent;
-use super::step::{Evaluator, Holds, Position, Progress, StepOutcome, Timing};
+use super::step::{ClauseOutcome, Evaluator, Position, Progress, StepOutcome, Timing};
 use super::timeline::Timeline;
 use tck_base::clock::Moment;
 use tck_base::pattern::Bindings;
@@ -42,7 +42,7 @@ pub struct TestJudge {
     trouble: Option<String>,
     verdict: Accumulated,
     result: TestResult,
-    departure: Departure,
+    departure: Disconnect,
     /// How it is gone when the test is over, by its silence or by its own word.
     silent: Option<Gone>,
     /// Why what is found may stem from somebody else.
@@ -103,7 +103,7 @@ impl TestJudge {
                 allowances: Vec::new(),
                 repetitions: Vec::new(),
             },
-            departure: Departure::default(),
+            departure: Disconnect::default(),
             silent: None,
             interference: ground.interference.clone(),
             interrupted: None,
@@ -191,8 +191,8 @@ impl TestJudge {
         }
     }
 
-    fn scene<'a>(&'a self, timeline: &'a Timeline, ground: &'a Ground) -> Scene<'a> {
-        Scene {
+    fn scene<'a>(&'a self, timeline: &'a Timeline, ground: &'a Ground) -> EvalContext<'a> {
+        EvalContext {
             checks: ground.checks,
             pack: &ground.pack,
             topics: &ground.topics,
@@ -312,8 +312,8 @@ impl TestJudge {
                 }
                 // A walk that went wrong, or a message that shows what it must not, is no matter of time.
                 let of_time = match (&clause.holds, &outcome.timing) {
-                    (Holds::Late, timing) => *timing,
-                    (Holds::No, Some(timing @ Timing::Missed(_)))
+                    (ClauseOutcome::HeldLate, timing) => *timing,
+                    (ClauseOutcome::Violated, Some(timing @ Timing::Missed(_)))
                         if clause.witness.is_none() || matches!(step.verb, Verb::Action(_)) =>
                     {
                         Some(*timing)
@@ -402,7 +402,7 @@ impl TestJudge {
                 lag.as_secs_f64()
             );
             open.clause.message = format!("cannot be told, since {why}; {}", open.clause.message);
-            open.clause.holds = Holds::Unseen(why);
+            open.clause.holds = ClauseOutcome::Unobservable(why);
         }
     }
 
@@ -420,17 +420,20 @@ impl TestJudge {
     fn allow_for_others(&mut self) {
         if let Some((since, why)) = &self.interrupted {
             for open in self.open.iter_mut().filter(|open| open.ended > *since) {
-                if matches!(open.clause.holds, Holds::No | Holds::Late | Holds::Softly) {
+                if matches!(
+                    open.clause.holds,
+                    ClauseOutcome::Violated | ClauseOutcome::HeldLate | ClauseOutcome::Warning
+                ) {
                     open.clause.message = format!("cannot be told, since {why}; {}", open.clause.message);
-                    open.clause.holds = Holds::Unseen(why.to_string());
+                    open.clause.holds = ClauseOutcome::Unobservable(why.to_string());
                 }
             }
         }
         let Some(why) = &self.interference else { return };
         for open in &mut self.open {
-            if matches!(open.clause.holds, Holds::No | Holds::Late) {
+            if matches!(open.clause.holds, ClauseOutcome::Violated | ClauseOutcome::HeldLate) {
                 open.clause.message = format!("cannot be told, since {why}; {}", open.clause.message);
-                open.clause.holds = Holds::Unseen(why.to_string());
+                open.clause.holds = ClauseOutcome::Unobservable(why.to_string());
             }
         }
     }

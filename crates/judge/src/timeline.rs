@@ -25,7 +25,7 @@ pub const OF_SECOND: &str = "@second";
 
 /// Whose topic it is.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct TopicOwner {
     /// Number of the vehicle, counted from 0.
     pub vehicle: usize,
     /// Topic name.
@@ -35,7 +35,7 @@ pub struct Place {
 /// The index.
 #[derive(Debug, Default)]
 pub struct Timeline {
-    topics: HashMap<String, Place>,
+    topics: HashMap<String, TopicOwner>,
     /// Whether what the harness sends is filed, too.
     own: bool,
     subjects: BTreeMap<String, Vec<Arc<Entry>>>,
@@ -150,7 +150,7 @@ impl Timeline {
 
     /// Whose topic an entry is about.
     #[must_use]
-    pub fn place(&self, entry: &Entry) -> Option<&Place> {
+    pub fn place(&self, entry: &Entry) -> Option<&TopicOwner> {
         let (Event::Message { topic, .. }
         | Event::Sent { topic, .. }
         | Event::Retained { topic, .. }
@@ -302,10 +302,10 @@ pub fn client_of(entry: &Entry) -> Option<&str> {
     }
 }
 
-fn places(topics: &BTreeMap<String, String>, vehicle: usize) -> impl Iterator<Item = (String, Place)> {
+fn places(topics: &BTreeMap<String, String>, vehicle: usize) -> impl Iterator<Item = (String, TopicOwner)> {
     topics.iter().map(move |(name, full)| {
         let name = name.clone();
-        (full.clone(), Place { vehicle, name })
+        (full.clone(), TopicOwner { vehicle, name })
     })
 }
 

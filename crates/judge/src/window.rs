@@ -2,9 +2,9 @@
 
 use serde_json::{Map, Value};
 
-use super::holds::{Holds, unbound_text};
-use super::mend::Mends;
-use super::scene::Scene;
+use super::clause_outcome::{ClauseOutcome, unbound_text};
+use super::eval_context::EvalContext;
+use super::repair::StateRepair;
 use tck_base::verdict::Verdict;
 use tck_check::{CheckContext, CheckFinding, Running, Shared, find};
 use tck_journal::Entry;
@@ -25,7 +25,7 @@ pub(super) struct CheckWindow {
     decides: &'static [&'static str],
     about: Vec<RequirementId>,
     /// How the states are read.
-    mends: Mends,
+    mends: StateRepair,
     /// Those of them that are about the window.
     told: Vec<CheckFinding>,
     /// How many entries of the test it has seen.
@@ -34,28 +34,28 @@ pub(super) struct CheckWindow {
 
 /// What a named check says about an entry.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Said {
+pub(super) enum CheckOutcome {
     /// It had nothing to judge there.
     Nothing,
     /// It found nothing wrong.
     Right,
     /// What it found: how the clause comes out, and why.
-    Wrong(Holds, String),
+    Wrong(ClauseOutcome, String),
 }
 
-impl Said {
+impl CheckOutcome {
     fn of(finding: &CheckFinding) -> Self {
         let holds = match finding.verdict {
-            Some(Verdict::Warning) => Holds::Softly,
-            Some(Verdict::Inconclusive) => Holds::Unseen(finding.message.clone()),
-            _ => Holds::No,
+            Some(Verdict::Warning) => ClauseOutcome::Warning,
+            Some(Verdict::Inconclusive) => ClauseOutcome::Unobservable(finding.message.clone()),
+            _ => ClauseOutcome::Violated,
         };
         Self::Wrong(holds, finding.message.clone())
     }
 }
 
 impl CheckWindow {
-    pub(super) fn start(check: &CheckUse, scene: &Scene<'_>) -> Result<Self, String> {
+    pub(super) fn start(check: &CheckUse, scene: &EvalContext<'_>) -> Result<Self, String> {
         let definition = find(scene.checks, &check.name).ok_or_else(|| format!("there is no check {}", check.name))?;
         let mut with = Map::new();
         for (name, term) in &check.with {
@@ -76,7 +76,7 @@ impl CheckWindow {
             findings: Vec::new(),
             decides: definition.decides,
             about: Vec::new(),
-            mends: Mends::default(),
+            mends: StateRepair::default(),
             told: Vec::new(),
             seen: 0,
         })
@@ -97,15 +97,15 @@ impl CheckWindow {
     }
 
     /// From now on the states are read as they are meant.
-    pub(super) fn lenient(mut self, mends: Mends) -> Self {
+    pub(super) fn lenient(mut self, mends: StateRepair) -> Self {
         self.mends = mends;
         self
     }
 
     /// Shows it everything of the test up to and including this entry, which may be of any topic: a check of the
     /// states has to know the orders. Returns what it says about this very entry.
-    pub(super) fn observe(&mut self, entry: &Entry, scene: &Scene<'_>) -> Said {
-        let mut said = Said::Nothing;
+    pub(super) fn observe(&mut self, entry: &Entry, scene: &EvalContext<'_>) -> CheckOutcome {
+        let mut said = CheckOutcome::Nothing;
         while let Some(next) = scene.entries.get(self.seen).filter(|next| next.seq() <= entry.seq()) {
             self.seen += 1;
             let before = self.findings.len();
@@ -123,8 +123,8 @@ impl CheckWindow {
                 self.told.extend(here);
                 said = match self.worst(before, Some(entry.seq())) {
                     Some(found) => found,
-                    None if judged => Said::Right,
-                    None => Said::Nothing,
+                    None if judged => CheckOutcome::Right,
+                    None => CheckOutcome::Nothing,
                 };
             }
         }
@@ -132,7 +132,7 @@ impl CheckWindow {
     }
 
     /// The worst finding from `first` on, about one entry or about any.
-    fn worst(&self, first: usize, seq: Option<u64>) -> Option<Said> {
+    fn worst(&self, first: usize, seq: Option<u64>) -> Option<CheckOutcome> {
         let severity = |finding: &&CheckFinding| match finding.verdict {
             Some(Verdict::Warning) => 0,
             Some(Verdict::Inconclusive) => 1,
@@ -140,12 +140,12 @@ impl CheckWindow {
         };
         let found = self.findings.get(first..)?.iter();
         let found = found.filter(|finding| seq.is_none_or(|seq| finding.seq == seq) && self.counts(finding));
-        found.max_by_key(severity).map(Said::of)
+        found.max_by_key(severity).map(CheckOutcome::of)
     }
 
     /// What it found in the window about one of these requirements, sorted out: for each the worst, if any. `None`
     /// while everything it found concerns whatever the clause is bound to.
-    pub(super) fn sorted(&self, bindings: &[Binding]) -> Option<Vec<Option<(u64, Said)>>> {
+    pub(super) fn sorted(&self, bindings: &[Binding]) -> Option<Vec<Option<(u64, CheckOutcome)>>> {
         let about =
             |finding: &&CheckFinding, binding: &Binding| finding.requirement.as_ref() == Some(&binding.requirement);
         let severity = |finding: &&CheckFinding| match finding.verdict {
@@ -159,13 +159,18 @@ impl CheckWindow {
         }
         let worst = |binding: &Binding| {
             let own = self.told.iter().filter(|finding| about(finding, binding));
-            own.max_by_key(severity).map(|finding| (finding.seq, Said::of(finding)))
+            own.max_by_key(severity)
+                .map(|finding| (finding.seq, CheckOutcome::of(finding)))
         };
         Some(bindings.iter().map(worst).collect())
     }
 
     /// The window has ended; returns what was found by that.
-    pub(super) fn finish(&mut self, end: tck_base::clock::Moment, scene: &Scene<'_>) -> Option<(Holds, String)> {
+    pub(super) fn finish(
+        &mut self,
+        end: tck_base::clock::Moment,
+        scene: &EvalContext<'_>,
+    ) -> Option<(ClauseOutcome, String)> {
         let before = self.findings.len();
         let context = context(scene, &self.with, &self.world, &self.shared);
         self.running
@@ -174,14 +179,14 @@ impl CheckWindow {
         let here: Vec<CheckFinding> = here.filter(|finding| self.counts(finding)).cloned().collect();
         self.told.extend(here);
         match self.worst(before, None)? {
-            Said::Wrong(holds, message) => Some((holds, message)),
-            Said::Nothing | Said::Right => None,
+            CheckOutcome::Wrong(holds, message) => Some((holds, message)),
+            CheckOutcome::Nothing | CheckOutcome::Right => None,
         }
     }
 }
 
 fn context<'a>(
-    scene: &'a Scene<'_>,
+    scene: &'a EvalContext<'_>,
     with: &'a Map<String, Value>,
     world: &'a World,
     shared: &'a Shared,
@@ -232,13 +237,13 @@ mod tests {
             findings: Vec::new(),
             decides: &[],
             about: Vec::new(),
-            mends: Mends::default(),
+            mends: StateRepair::default(),
             told,
             seen: 0,
         }
     }
 
-    fn sorted(told: Vec<CheckFinding>) -> Option<Vec<Option<(u64, Said)>>> {
+    fn sorted(told: Vec<CheckFinding>) -> Option<Vec<Option<(u64, CheckOutcome)>>> {
         let source = Source::new("test", "");
         let bindings = ["BLOCK-01", "BLOCK-05"].map(|id| Binding {
             requirement: RequirementId::from(id),
@@ -275,7 +280,7 @@ mod tests {
             finding(Some("BLOCK-05"), Some(Verdict::Warning), 3),
             finding(Some("BLOCK-05"), None, 5),
         ];
-        let expected = Said::Wrong(Holds::No, "found at 5".to_owned());
+        let expected = CheckOutcome::Wrong(ClauseOutcome::Violated, "found at 5".to_owned());
         assert_eq!(sorted(told), Some(vec![None, Some((5, expected))]));
     }
 

@@ -75,7 +75,7 @@ pub struct Breakage {
 
 /// Which parts of a message are there to be broken.
 #[derive(Clone, Debug, Default)]
-pub struct Ground {
+pub struct BreakageScope {
     /// Which element of a list is entered; a list that is not named is taken as a whole.
     pub elements: BTreeMap<String, usize>,
     /// Optional objects that are put in to be broken; one that is not named is taken as a whole.
@@ -83,20 +83,20 @@ pub struct Ground {
 }
 
 /// Every breakage, in the order of the schema.
-pub(super) fn breakages(root: &Value, ground: &Ground) -> Vec<Breakage> {
+pub(super) fn breakages(root: &Value, ground: &BreakageScope) -> Vec<Breakage> {
     let mut walk = Walk {
         root,
         ground,
         found: Vec::new(),
     };
-    let top = Place::default();
+    let top = WalkPosition::default();
     walk.object(&parts(root, root), &top, 0);
     walk.found
 }
 
 /// Where a walk is.
 #[derive(Clone, Default)]
-struct Place {
+struct WalkPosition {
     member: String,
     pointer: String,
     optional: Option<String>,
@@ -106,12 +106,12 @@ struct Place {
 
 struct Walk<'a> {
     root: &'a Value,
-    ground: &'a Ground,
+    ground: &'a BreakageScope,
     found: Vec<Breakage>,
 }
 
 impl<'a> Walk<'a> {
-    fn object(&mut self, here: &[&'a Value], place: &Place, depth: usize) {
+    fn object(&mut self, here: &[&'a Value], place: &WalkPosition, depth: usize) {
         if depth > MAX_DEPTH {
             return;
         }
@@ -144,7 +144,7 @@ impl<'a> Walk<'a> {
     }
 
     /// Goes on inside a member, where there is something to break.
-    fn enter(&mut self, child: &[&'a Value], mut place: Place, required: bool, depth: usize) {
+    fn enter(&mut self, child: &[&'a Value], mut place: WalkPosition, required: bool, depth: usize) {
         if !required {
             let Some(value) = self.ground.holding.get(&place.member) else {
                 return;
@@ -166,7 +166,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    fn leaf(&mut self, schema: &[&Value], place: &Place, required: bool) {
+    fn leaf(&mut self, schema: &[&Value], place: &WalkPosition, required: bool) {
         let kinds = kinds(schema);
         let number = |word: &str| schema.iter().find_map(|part| part.get(word)?.as_f64());
         let some = |word: &str| number(word).is_some_and(|least| least > 0.0);
@@ -215,7 +215,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    fn add(&mut self, place: &Place, way: Way, operation: Value) {
+    fn add(&mut self, place: &WalkPosition, way: Way, operation: Value) {
         let mut patch = place.first.clone();
         patch.push(operation);
         self.found.push(Breakage {
@@ -260,7 +260,7 @@ mod tests {
         })
     }
 
-    fn named(ground: &Ground) -> Vec<String> {
+    fn named(ground: &BreakageScope) -> Vec<String> {
         let all = breakages(&schema(), ground);
         all.iter()
             .map(|one| format!("{}-{}", one.member, one.way.word()))
@@ -269,7 +269,7 @@ mod tests {
 
     #[test]
     fn each_member_is_broken_in_each_way_its_schema_knows() {
-        let ground = Ground {
+        let ground = BreakageScope {
             elements: BTreeMap::from([("list".to_owned(), 1)]),
             holding: BTreeMap::from([("box".to_owned(), json!({ "x": 2.5 }))]),
         };
@@ -298,15 +298,15 @@ mod tests {
 
     #[test]
     fn only_what_is_there_is_entered() {
-        let names = named(&Ground::default());
+        let names = named(&BreakageScope::default());
         assert!(!names.iter().any(|name| name.contains('.')), "{names:?}");
     }
 
     #[test]
     fn an_optional_object_is_put_in_before_it_is_broken() {
-        let ground = Ground {
+        let ground = BreakageScope {
             holding: BTreeMap::from([("box".to_owned(), json!({ "x": 2.5 }))]),
-            ..Ground::default()
+            ..BreakageScope::default()
         };
         let all = breakages(&schema(), &ground);
         let quoted = all

@@ -25,11 +25,11 @@ mod version;
 mod tests;
 
 pub use assets::{AssetFile, Assets};
-pub use breakage::{Breakage, Ground, Way};
+pub use breakage::{Breakage, BreakageScope, Way};
 pub use catalogue::{Catalogue, Decided, Mood, Requirement, RequirementId, Subject, VersionNote};
 pub use hooks::{HookChange, HookEffect, HookInfo, HookParameter, HookRisk, HookValue, Hooks};
 pub use participant::Participant;
-pub use protocol::{Pack, PackError, Packs, Said, TopicName, TopicRule};
+pub use protocol::{Pack, PackError, Packs, TopicName, TopicRule, VersionClaim};
 pub use schema::{Finding, FindingKind, MessageSchema};
 pub use shape::Shape;
 pub use version::{Version, VersionRange};

@@ -349,13 +349,13 @@ impl Packs {
 
     /// What a text that stands where a version is due is worth.
     #[must_use]
-    pub fn said(&self, text: &str) -> Said<'_> {
+    pub fn said(&self, text: &str) -> VersionClaim<'_> {
         if let Some(pack) = self.get(text) {
-            return Said::Known(pack);
+            return VersionClaim::Known(pack);
         }
         match text.parse::<Version>() {
-            Ok(version) if self.may_exist(version) => Said::Unknown(version),
-            _ => Said::NoVersion,
+            Ok(version) if self.may_exist(version) => VersionClaim::Unknown(version),
+            _ => VersionClaim::NoVersion,
         }
     }
 
@@ -380,7 +380,7 @@ const EARLIER: [(u64, u64); 2] = [(1, 0), (1, 1)];
 
 /// What a text is worth that stands where a version is due.
 #[derive(Clone, Debug)]
-pub enum Said<'p> {
+pub enum VersionClaim<'p> {
     /// A version that there are rules for.
     Known(&'p Arc<Pack>),
     /// A version that there are no rules for.

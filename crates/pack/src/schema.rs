@@ -104,7 +104,7 @@ impl MessageSchema {
 
     /// Every way to break one member of a message that is right.
     #[must_use]
-    pub fn breakages(&self, ground: &super::Ground) -> Vec<super::Breakage> {
+    pub fn breakages(&self, ground: &super::BreakageScope) -> Vec<super::Breakage> {
         super::breakage::breakages(&self.0.raw, ground)
     }
 }

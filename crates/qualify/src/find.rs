@@ -5,7 +5,7 @@
 use std::collections::BTreeSet;
 
 use super::DRAWN;
-use super::kill::{Grounds, Kill, concerns};
+use super::kill::{Kill, KillContext, concerns};
 use tck_base::verdict::Verdict;
 use tck_engine::EngineError;
 use tck_pack::Role;
@@ -27,7 +27,7 @@ pub(super) fn is_found(role: Role, kill: &Kill) -> bool {
 ///
 /// # Errors
 /// When a run cannot be carried out.
-pub(super) fn find(grounds: &Grounds<'_>, role: Role, fault: &Fault) -> Result<Kill, EngineError> {
+pub(super) fn find(grounds: &KillContext<'_>, role: Role, fault: &Fault) -> Result<Kill, EngineError> {
     let mut kill = Kill::nothing(fault);
     let mut tried = |draw: Option<u64>, selected: &dyn Fn(&Test) -> bool| -> Result<bool, EngineError> {
         kill.join(grounds.kill(fault, draw, selected)?);

@@ -71,13 +71,13 @@ pub(super) struct Vehicle {
 }
 
 /// What there is to try faults on.
-pub(super) struct Grounds<'g> {
+pub(super) struct KillContext<'g> {
     pub(super) library: &'g Library,
     pub(super) pack: &'g Pack,
     pub(super) vehicles: Vec<Vehicle>,
 }
 
-impl Grounds<'_> {
+impl KillContext<'_> {
     /// All tests, those of one table counting once, in their order.
     pub(super) fn tables(&self) -> Vec<&str> {
         let mut seen = BTreeSet::new();

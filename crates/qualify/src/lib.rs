@@ -24,7 +24,7 @@ pub use outcome::Qualification;
 pub use parallel::on_all_cores;
 
 use self::decider::{blemishes_of, decided_in};
-use self::kill::{Grounds, Vehicle, each};
+use self::kill::{KillContext, Vehicle, each};
 use tck_engine::EngineError;
 use tck_judge::Library;
 use tck_pack::{Pack, Role};
@@ -83,7 +83,7 @@ pub fn qualify(
         });
         deciders.extend(own);
     }
-    let grounds = Grounds {
+    let grounds = KillContext {
         library,
         pack,
         vehicles,

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::DRAWN;
 use super::decider::Decider;
-use super::kill::{Grounds, Kill, concerns, each, merge};
+use super::kill::{Kill, KillContext, concerns, each, merge};
 use tck_engine::EngineError;
 use tck_reference::Fault;
 use tck_suite::Exceptions;
@@ -18,13 +18,13 @@ const CHUNK: usize = 12;
 
 /// What there is to prove, and on what.
 pub(super) struct Rest<'r> {
-    grounds: &'r Grounds<'r>,
+    grounds: &'r KillContext<'r>,
     /// What passes on the faultless device, but for what the suites say no fault is known to fail.
     deciders: Vec<&'r Decider>,
 }
 
 impl<'r> Rest<'r> {
-    pub(super) fn new(grounds: &'r Grounds<'r>, deciders: &'r BTreeSet<Decider>, exceptions: &Exceptions) -> Self {
+    pub(super) fn new(grounds: &'r KillContext<'r>, deciders: &'r BTreeSet<Decider>, exceptions: &Exceptions) -> Self {
         let excused = |decider: &Decider| exceptions.unproven.iter().any(|one| decider.is(one));
         let deciders = deciders.iter().filter(|decider| !excused(decider)).collect();
         Self { grounds, deciders }

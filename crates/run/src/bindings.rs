@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use serde_json::{Map, Value};
 
+use super::idle::Home;
 use super::pace::{Pace, between_looks};
-use super::rest::Home;
 use tck_course::{Layout, Standing};
 use tck_engine::IdForm;
 use tck_journal::Reason;

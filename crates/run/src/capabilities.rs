@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value};
 
-use super::fits::outgrown;
+use super::factsheet_limits::exceeded;
 use super::sheet::Sheet;
 use tck_base::pattern::{Term, TermKind};
 use tck_journal::event::{Capability, Gate};
@@ -91,7 +91,7 @@ impl Capabilities {
         if let Some(why) = ordered.find_map(|action| self.blocks_otherwise(action)) {
             return Err(why);
         }
-        if let Some(why) = self.factsheet.as_ref().and_then(|sheet| outgrown(sheet, test)) {
+        if let Some(why) = self.factsheet.as_ref().and_then(|sheet| exceeded(sheet, test)) {
             return Err(why);
         }
         if test.moves

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use super::rest::Obstacle;
+use super::idle::Obstacle;
 use tck_base::clock::Moment;
 use tck_base::pattern::whole;
 use tck_journal::event::{Event, Reading, Waiver};

@@ -11,11 +11,11 @@ use super::bindings::{course_of, own_bindings};
 use super::capabilities::Capabilities;
 use super::draw::draw;
 use super::estimate::Outlook;
+use super::idle::{Home, Obstacle};
+use super::precondition_breaker::PreconditionBreaker;
 use super::presence::{Presence, gone};
-use super::rest::{Home, Obstacle};
 use super::risk::by_risk;
 use super::sheet::Sheet;
-use super::strikes::Strikes;
 use tck_base::verdict::Verdict;
 use tck_course::Layout;
 use tck_engine::{Engine, EngineError, Operator, Recorder, Watcher};
@@ -217,7 +217,7 @@ pub(super) struct Session<'a, L, O> {
     /// From which record on the device has what it needs after a start.
     pub(super) ready_since: u64,
     /// Preconditions that are not reached again and again.
-    strikes: Strikes,
+    strikes: PreconditionBreaker,
     /// What each of the tests was to take, and how long the run still takes; in virtual time nobody waits for it.
     pub(super) estimates: Vec<Duration>,
     pub(super) outlook: Outlook,
@@ -241,7 +241,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             unhelped: 0,
             orders: 0,
             ready_since: 0,
-            strikes: Strikes::default(),
+            strikes: PreconditionBreaker::default(),
             estimates: Vec::new(),
             outlook: Outlook::default(),
         }

@@ -8,7 +8,7 @@ use super::driver::RunningDevice;
 use super::fleet::Fleet;
 use super::reference_agv::ReferenceAgv;
 use super::reference_master_control::ReferenceMasterControl;
-use super::unknown::UnknownName;
+use super::unknown_name::UnknownName;
 use tck_base::clock::WallClock;
 use tck_base::device::Device;
 use tck_course::Layout;

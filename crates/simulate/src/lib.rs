@@ -14,7 +14,7 @@ mod reference_agv;
 mod reference_master_control;
 mod running_fleet;
 mod site;
-mod unknown;
+mod unknown_name;
 mod witness;
 
 pub use built_in::BuiltIn;
@@ -24,4 +24,4 @@ pub use reference_agv::{ReferenceAgv, Vehicle};
 pub use reference_master_control::ReferenceMasterControl;
 pub use running_fleet::WithFleet;
 pub use site::{Injected, KINDS, Kind, Messages, Site, SiteMessage};
-pub use unknown::UnknownName;
+pub use unknown_name::UnknownName;

@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 
 use super::fleet::{Fleet, USUAL_FLEET};
 use super::reference_agv::ReferenceAgv;
-use super::unknown::UnknownName;
+use super::unknown_name::UnknownName;
 use tck_course::{Layout, Node};
 use tck_pack::Participant;
 use tck_pack::{Pack, Role};

@@ -6,20 +6,20 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+mod conversation;
 mod course;
-mod drawn;
 mod exceptions;
 mod expand;
 mod fields;
-mod filed;
 mod grammar;
 mod lint;
 mod load;
 mod matrix;
+mod metadata;
 pub mod model;
 mod read;
 mod recordings;
-mod said;
+mod schema_cases;
 mod source;
 mod steps;
 mod stimuli;

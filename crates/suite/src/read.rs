@@ -4,17 +4,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::CheckInfo;
+use super::conversation::conversation;
 use super::course::course_need;
-use super::drawn;
 use super::expand::Fill;
 use super::fields::{Fields, Problems, text_of};
-use super::filed::{maturity, tags};
 use super::grammar::need;
 use super::lint::{self, HeaderPlaces, Vocabulary};
 use super::matrix;
+use super::metadata::{maturity, tags};
 use super::model::{About, Binding, CourseNeed, Drawn, Monitor, Need, Rule, Test};
 use super::recordings::recordings;
-use super::said::conversation;
+use super::schema_cases;
 use super::source::{States, parse};
 use super::steps::{StepReader, check_use, checks, version_range};
 use super::terms::pattern;
@@ -153,7 +153,7 @@ pub(super) fn read_test(
         let root = Fill::new("with", nothing).apply_to(&root, problems);
         return reader.read(&root, Case::Whole, problems).into_iter().collect();
     };
-    if cases.get(drawn::FROM_SCHEMA).is_some() {
+    if cases.get(schema_cases::FROM_SCHEMA).is_some() {
         return reader.draw(&fields, &root, cases, problems);
     }
     let before_rows = problems.len();
@@ -306,7 +306,7 @@ impl TestReader<'_> {
     /// The tests of a table that comes from a schema.
     fn draw(&self, fields: &Fields<'_>, root: &Node, cases: &Node, problems: &mut Problems) -> Vec<Test> {
         let spec = fields.get("spec", &mut Problems::default());
-        let rows = drawn::rows(cases, spec, self.vocabulary, problems);
+        let rows = schema_cases::rows(cases, spec, self.vocabulary, problems);
         if !fields
             .entries()
             .iter()

@@ -1,6 +1,6 @@
 //! Live traffic, judged by the monitors as recorded traffic is.
 //!
-//! [`Watch`] is shown message after message and tells each finding with the message that shows it. [`glance`] keeps what
+//! [`Watch`] is shown message after message and tells each finding with the message that shows it. [`vehicle_status`] keeps what
 //! is worth knowing of every vehicle at present, [`alarm`] is what somebody is told at once, [`metrics`] writes it for a scraper, [`recorder`] keeps a journal that an
 //! audit judges alike, and [`listener`] stays connected to a broker. [`session`] brings them together. What is kept is
 //! bounded, so a watch may go on for weeks.
@@ -8,19 +8,18 @@
 #![warn(missing_docs)]
 
 pub mod alarm;
-pub mod glance;
 mod listener;
 mod metrics;
 mod recorder;
 mod served;
 pub mod session;
+pub mod vehicle_status;
 
 use std::collections::{BTreeMap, VecDeque};
 
 use bytes::Bytes;
 
 use alarm::{Alarm, Alarmed};
-use glance::{Glance, Kind, PERIOD};
 use tck_audit::result::AuditResult;
 use tck_audit::{Audit, AuditError, Found, Options};
 use tck_base::clock::{Moment, Stamp};
@@ -28,6 +27,7 @@ use tck_base::verdict::Verdict;
 use tck_capture::{Message, Wire};
 use tck_judge::Rules;
 use tck_pack::Packs;
+use vehicle_status::{Kind, PERIOD, VehicleStatus};
 
 pub use recorder::Rotation;
 
@@ -85,7 +85,7 @@ impl Recent {
 pub struct Watch<'r> {
     audit: Audit<'r>,
     recent: Recent,
-    glances: BTreeMap<String, Glance>,
+    glances: BTreeMap<String, VehicleStatus>,
     /// By manufacturer and serial number: which of them it is.
     names: BTreeMap<(String, String), String>,
     elsewhere: u64,
@@ -127,7 +127,7 @@ impl<'r> Watch<'r> {
                     let glance = self
                         .glances
                         .entry(address.vehicle.clone())
-                        .or_insert_with(|| Glance::new(&address));
+                        .or_insert_with(|| VehicleStatus::new(&address));
                     let stored = message.retain == Some(true);
                     let alarms = glance.take(&address.name, at, stored, &message.payload, self.packs);
                     self.alarms
@@ -197,8 +197,8 @@ impl<'r> Watch<'r> {
 
     /// The vehicles with the worst findings first, by name where they are alike.
     #[must_use]
-    pub fn worst_first(&self) -> Vec<&Glance> {
-        let mut all: Vec<&Glance> = self.glances.values().collect();
+    pub fn worst_first(&self) -> Vec<&VehicleStatus> {
+        let mut all: Vec<&VehicleStatus> = self.glances.values().collect();
         all.sort_by_cached_key(|glance| {
             let kinds = |verdict| std::cmp::Reverse(glance.found(verdict));
             let name = (glance.manufacturer.clone(), glance.serial_number.clone());
@@ -208,7 +208,7 @@ impl<'r> Watch<'r> {
     }
 
     /// The vehicles that were heard.
-    pub fn glances(&self) -> impl ExactSizeIterator<Item = &Glance> {
+    pub fn glances(&self) -> impl ExactSizeIterator<Item = &VehicleStatus> {
         self.glances.values()
     }
 
@@ -222,7 +222,8 @@ impl<'r> Watch<'r> {
     #[must_use]
     pub fn finish(self) -> AuditResult {
         let silent = self.glances.values().filter(|glance| glance.is_silent());
-        let found: Vec<(&Glance, &Kind)> = silent.filter_map(|glance| Some((glance, glance.silences()?))).collect();
+        let found: Vec<(&VehicleStatus, &Kind)> =
+            silent.filter_map(|glance| Some((glance, glance.silences()?))).collect();
         let mut result = self.audit.finish(Vec::new());
         for (glance, kind) in found {
             // What is still going on no message has shown yet.

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::Watch;
-use super::glance::{BUCKETS, Glance};
+use super::vehicle_status::{BUCKETS, VehicleStatus};
 
 /// The type of the text.
 pub(super) const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
@@ -52,7 +52,7 @@ fn escaped(text: &str) -> String {
 }
 
 /// The labels by which a vehicle is known.
-fn named(glance: &Glance) -> [(&'static str, &str); 2] {
+fn named(glance: &VehicleStatus) -> [(&'static str, &str); 2] {
     [
         ("manufacturer", &glance.manufacturer),
         ("serial_number", &glance.serial_number),
@@ -86,7 +86,7 @@ pub(super) fn page(watch: &Watch<'_>, contact: Contact) -> String {
         "Messages on topics of no vehicle that is watched.",
     );
     page.sample("vda5050_other_messages_total", &[], watch.elsewhere());
-    let vehicles: Vec<&Glance> = watch.glances().collect();
+    let vehicles: Vec<&VehicleStatus> = watch.glances().collect();
     page.family("vda5050_messages", "counter", "Messages by vehicle and topic.");
     for glance in &vehicles {
         for (topic, count) in &glance.messages {

@@ -17,7 +17,7 @@ use tck_audit::result::AuditResult;
 use tck_audit::{AuditError, Options};
 use tck_base::clock::{Moment, WallClock};
 use tck_base::verdict::Verdict;
-use tck_capture::{Carried, Message, Place, taped};
+use tck_capture::{Carried, Message, SourcePosition, from_journal};
 use tck_journal::event::{Direction, Event, Payload, RunHeader};
 use tck_judge::Rules;
 use tck_net::bench::LinkError;
@@ -170,10 +170,10 @@ pub async fn run(
                     recorder.record(occurrence.at, occurrence.source, occurrence.direction, occurrence.event.clone())?;
                 }
                 let (at, source) = (occurrence.at, occurrence.source);
-                let Some(wire) = taped::wire(at.utc, source, occurrence.direction, &occurrence.event, 0) else {
+                let Some(wire) = from_journal::wire(at.utc, source, occurrence.direction, &occurrence.event, 0) else {
                     continue;
                 };
-                let message = taped::carried(&wire, Place::default());
+                let message = from_journal::carried(&wire, SourcePosition::default());
                 let mut notices = watch.take_wire(wire);
                 if let Some(message) = message {
                     notices.extend(watch.take(at, message));
@@ -225,7 +225,7 @@ pub async fn run(
                         payload,
                         qos: Some(qos),
                         retain: Some(retain),
-                        place: Place::default(),
+                        place: SourcePosition::default(),
                         after_gap: std::mem::take(&mut after_gap),
                         carried: tap.is_some().then_some(Carried::BESIDE_TAP),
                     };

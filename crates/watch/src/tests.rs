@@ -3,7 +3,7 @@ use serde_json::{Value, json};
 use super::*;
 use tck_base::clock::Moment;
 use tck_base::verdict::Verdict;
-use tck_capture::Place;
+use tck_capture::SourcePosition;
 use tck_judge::Library;
 
 fn message(library: &Library, name: &str, number: u64, more: Value) -> (Stamp, Message) {
@@ -23,7 +23,7 @@ fn message(library: &Library, name: &str, number: u64, more: Value) -> (Stamp, M
         payload: payload.to_string().into_bytes().into(),
         qos: Some(0),
         retain: Some(false),
-        place: Place::default(),
+        place: SourcePosition::default(),
         after_gap: false,
         carried: None,
     };

@@ -12,7 +12,7 @@ use crate::cli::device::tolerate;
 use crate::cli::ending::stop;
 use crate::cli::problem::Problem;
 use crate::cli::run::{hold, person};
-use crate::ui::Desk;
+use crate::ui::Prompter;
 use tck_base::clock::WallClock;
 use tck_explore::{ConversationFile, Explored, Purpose, Stage};
 use tck_journal::Reason;
@@ -24,7 +24,8 @@ use tck_profile::{Effective, Surroundings};
 use tck_report::junit::Inconclusive;
 use tck_result::RunResult;
 use tck_run::{
-    Bundle, Finished, Place, Request, Selection, Silent, SocketRun, VirtualRun, run_virtually, sources, write_all,
+    Bundle, Finished, LiveRun, ProfileContext, Request, Selection, Silent, VirtualRun, run_virtually, sources,
+    write_all,
 };
 use tck_simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
 use tck_suite::model::Test;
@@ -89,7 +90,7 @@ pub(super) struct OnStage {
     interrupt: watch::Receiver<bool>,
     /// How long stimuli are tried and conversations carried out, and since when.
     budget: Option<(Instant, Duration)>,
-    desk: Desk,
+    desk: Prompter,
     rounds: u32,
     kept: Option<PathBuf>,
     /// The report whose tests are the conversations of the findings.
@@ -111,7 +112,7 @@ impl OnStage {
             reports: reports.to_owned(),
             runtime,
             interrupt: stop.subscribe(),
-            desk: Desk::new(stop),
+            desk: Prompter::new(stop),
             budget: None,
             rounds: 0,
             kept: None,
@@ -209,7 +210,7 @@ impl OnStage {
                 self.runtime.block_on(run).map_err(environment)
             }
             Device::BuiltIn { device, faults } => {
-                let run = SocketRun::built_in(device.clone(), faults, library, pack);
+                let run = LiveRun::built_in(device.clone(), faults, library, pack);
                 self.over_sockets(run, request, writer, interrupt)
             }
             Device::Profile {
@@ -218,13 +219,13 @@ impl OnStage {
                 folder,
                 still,
             } => {
-                let place = Place {
+                let place = ProfileContext {
                     profile: None,
                     folder: folder.clone(),
                     person: person(&self.desk, false),
                     vehicles: None,
                 };
-                let mut run = SocketRun::of_profile(effective, library, pack, surroundings, place)?;
+                let mut run = LiveRun::of_profile(effective, library, pack, surroundings, place)?;
                 if *still {
                     run.device.stand_still(Reason::MotionRuledOut);
                 }
@@ -235,7 +236,7 @@ impl OnStage {
 
     fn over_sockets(
         &self,
-        mut run: SocketRun,
+        mut run: LiveRun,
         request: Request,
         writer: Option<JournalWriter>,
         interrupt: watch::Receiver<bool>,

@@ -5,7 +5,7 @@ use serde_json::json;
 use super::*;
 use tck_audit::Options;
 use tck_base::clock::{Moment, Stamp};
-use tck_capture::{Message, Place};
+use tck_capture::{Message, SourcePosition};
 
 fn heard(watch: &mut Watch<'_>, serial: &str, name: &str, payload: &serde_json::Value) {
     let utc = jiff::Timestamp::from_second(1_767_225_600).expect("time");
@@ -15,7 +15,7 @@ fn heard(watch: &mut Watch<'_>, serial: &str, name: &str, payload: &serde_json::
         payload: payload.to_string().into_bytes().into(),
         qos: Some(0),
         retain: Some(false),
-        place: Place::default(),
+        place: SourcePosition::default(),
         after_gap: false,
         carried: None,
     };

@@ -9,8 +9,8 @@ use ratatui::widgets::{Block, Cell, Paragraph, Row, Table, TableState};
 use super::marked;
 use tck_base::verdict::Verdict;
 use tck_report::clean::{line, short};
-use tck_watch::glance::{Glance, Kind};
 use tck_watch::session::Contact;
+use tck_watch::vehicle_status::{Kind, VehicleStatus};
 
 /// Which list the keys move in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,22 +67,23 @@ impl View {
     }
 
     /// Keeps the choice among what there is.
-    pub fn choose(&mut self, glances: &[&Glance]) {
+    pub fn choose(&mut self, glances: &[&VehicleStatus]) {
         self.vehicle = self.vehicle.min(glances.len().saturating_sub(1));
         if std::mem::take(&mut self.chooses) {
             let chosen = glances.get(self.vehicle);
             self.chosen = chosen.map(|glance| (glance.manufacturer.clone(), glance.serial_number.clone()));
         } else if let Some((manufacturer, serial_number)) = &self.chosen {
             // Others may have moved past it since.
-            let is_chosen =
-                |glance: &&Glance| glance.manufacturer == *manufacturer && glance.serial_number == *serial_number;
+            let is_chosen = |glance: &&VehicleStatus| {
+                glance.manufacturer == *manufacturer && glance.serial_number == *serial_number
+            };
             self.vehicle = glances.iter().position(is_chosen).unwrap_or(self.vehicle);
         }
         let kinds = glances.get(self.vehicle).map_or(0, |glance| glance.kinds.len());
         self.finding = self.finding.min(kinds.saturating_sub(1));
     }
 
-    pub fn draw(&mut self, frame: &mut Frame<'_>, glances: &[&Glance], contact: Contact) {
+    pub fn draw(&mut self, frame: &mut Frame<'_>, glances: &[&VehicleStatus], contact: Contact) {
         let [top, vehicles, findings, detail, bottom] = Layout::vertical([
             Constraint::Length(1),
             Constraint::Ratio(1, 4),
@@ -105,7 +106,7 @@ impl View {
         );
     }
 
-    fn title(&self, glances: &[&Glance], contact: Contact) -> Line<'static> {
+    fn title(&self, glances: &[&VehicleStatus], contact: Contact) -> Line<'static> {
         let messages: u64 = glances.iter().flat_map(|glance| glance.messages.values()).sum();
         let kinds = |verdict: Verdict| glances.iter().map(|glance| glance.found(verdict)).sum::<usize>();
         let mut spans = vec![Span::styled(
@@ -127,7 +128,7 @@ impl View {
         Line::from(spans)
     }
 
-    fn vehicles(&self, frame: &mut Frame<'_>, area: Rect, glances: &[&Glance]) {
+    fn vehicles(&self, frame: &mut Frame<'_>, area: Rect, glances: &[&VehicleStatus]) {
         // Only what is shown is made ready: there may be thousands.
         let height = usize::from(area.height.saturating_sub(3)).max(1);
         let first = self.vehicle.saturating_sub(height - 1);
@@ -230,7 +231,7 @@ impl View {
     }
 
     /// The chosen finding with its message; without one, the last state.
-    fn detail(&self, frame: &mut Frame<'_>, area: Rect, glance: Option<&Glance>, kind: Option<&Kind>) {
+    fn detail(&self, frame: &mut Frame<'_>, area: Rect, glance: Option<&VehicleStatus>, kind: Option<&Kind>) {
         let height = usize::from(area.height.saturating_sub(2));
         let (title, mut lines, message) = match (kind, glance) {
             (Some(kind), _) => {

@@ -4,9 +4,9 @@ use std::collections::HashMap;
 
 use jiff::Timestamp;
 
-use super::flow::{Flow, Part};
 use super::frames::{End, Segment};
-use super::talk::{Heard, Talk};
+use super::mqtt_stream::{Heard, MqttStream};
+use super::tcp_reassembly::{Part, TcpReassembly};
 use crate::{Wire, WireEvent};
 use tck_journal::event::{Close, Packet};
 
@@ -63,8 +63,8 @@ impl Other {
 
 #[derive(Default)]
 struct Direction {
-    flow: Flow,
-    talk: Talk,
+    flow: TcpReassembly,
+    talk: MqttStream,
     closed: bool,
 }
 

@@ -1,20 +1,20 @@
 //! Captured network traffic: pcap and pcapng files with MQTT over TCP.
 //!
-//! [`frames`] reads the file and finds the TCP segments, [`flow`] puts them in order, [`talk`] cuts the stream into MQTT
+//! [`frames`] reads the file and finds the TCP segments, [`tcp_reassembly`] puts them in order, [`mqtt_stream`] cuts the stream into MQTT
 //! packets, and [`connections`] keeps them apart. What was lost on the way into the capture is a gap and no mistake of
 //! anybody.
 
 mod connections;
-mod flow;
 mod frames;
-mod talk;
+mod mqtt_stream;
+mod tcp_reassembly;
 #[cfg(test)]
 mod tests;
 
 use std::collections::VecDeque;
 use std::io::{self, BufRead};
 
-use super::{Carried, Counted, Item, Message, Place, Read, Wire, WireEvent};
+use super::{Carried, Counted, Item, Message, Read, SourcePosition, Wire, WireEvent};
 use connections::{Connections, Other};
 use frames::{Frame, Frames};
 use tck_journal::Payload;
@@ -58,8 +58,8 @@ impl Packets {
 
     /// Which frame was read last.
     #[must_use]
-    pub fn place(&self) -> Place {
-        Place {
+    pub fn place(&self) -> SourcePosition {
+        SourcePosition {
             file: self.file,
             line: self.counted.lines,
         }
@@ -108,7 +108,7 @@ impl Packets {
 }
 
 /// The message that a packet carries.
-pub(super) fn message(wire: &Wire, place: Place) -> Option<Message> {
+pub(super) fn message(wire: &Wire, place: SourcePosition) -> Option<Message> {
     let WireEvent::Packet {
         packet:
             Packet::Publish {

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use super::super::conversation_coverage;
 use super::super::decide::mood;
-use super::super::joined;
-use super::super::opinions::Opinions;
-use super::super::said;
-use super::super::watches::Watched;
+use super::super::merge;
+use super::super::monitor_set::MonitorReport;
+use super::super::requirement_verdict::RequirementVerdict;
 use super::RunJudge;
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_journal::Reason;
@@ -32,7 +32,7 @@ impl RunJudge {
         let mut tests = if self.is_stranger {
             Vec::new()
         } else {
-            let mut tests = joined::repetitions(&self.done);
+            let mut tests = merge::repetitions(&self.done);
             if self.end.is_some() {
                 self.complain_of_left_out(&mut tests);
             }
@@ -40,7 +40,7 @@ impl RunJudge {
             tests
         };
         if let Some(earlier) = &self.earlier {
-            tests = joined::tests(earlier.tests(), tests);
+            tests = merge::tests(earlier.tests(), tests);
         }
         // Which order they were run in is the harness's own business.
         let suites = self.rules.suites.tests.iter().enumerate();
@@ -105,7 +105,7 @@ impl RunJudge {
             journal: "journal.jsonl".to_owned(),
             joined,
             requirements: self.requirements(&tests, &watched),
-            exploration: said::exploration(&self.rules.suites.tests, &tests, self.role),
+            exploration: conversation_coverage::exploration(&self.rules.suites.tests, &tests, self.role),
             tests,
             monitors: watched.into_iter().map(|watched| watched.result).collect(),
             capabilities: self
@@ -175,7 +175,7 @@ impl RunJudge {
                 Some(Gate::Unobservable(why) | Gate::NotApplicable(why)) => Some(why),
                 Some(Gate::Runs) | None => None,
             };
-            joined::left_out(test, repeat, why);
+            merge::left_out(test, repeat, why);
         }
     }
 
@@ -235,8 +235,8 @@ impl RunJudge {
         all
     }
 
-    fn requirements(&self, tests: &[TestResult], watched: &[Watched]) -> Vec<RequirementResult> {
-        let mut decided: BTreeMap<&str, Opinions> = BTreeMap::new();
+    fn requirements(&self, tests: &[TestResult], watched: &[MonitorReport]) -> Vec<RequirementResult> {
+        let mut decided: BTreeMap<&str, RequirementVerdict> = BTreeMap::new();
         for test in tests {
             for decision in &test.decisions {
                 let opinions = decided.entry(decision.requirement.as_str()).or_default();
@@ -275,7 +275,7 @@ impl RunJudge {
         all
     }
 
-    fn why_not(&self, id: &str, decided: &Decided, tests: &[TestResult], watched: &[Watched]) -> NotDecided {
+    fn why_not(&self, id: &str, decided: &Decided, tests: &[TestResult], watched: &[MonitorReport]) -> NotDecided {
         if let Decided::NotTestable { reason } = decided {
             return NotDecided::NotTestable(reason.clone());
         }

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-use super::super::joined;
+use super::super::merge;
+use super::super::monitor_set::MonitorReport;
 use super::super::rules::{JudgeError, Rules};
-use super::super::watches::Watched;
 use super::{BREAKS_OFF, RunJudge};
 use tck_journal::Entry;
 use tck_journal::event::{Event, RunHeader};
@@ -59,7 +59,7 @@ impl RunJudge {
             started: format!("{:.3}", earlier.begun.utc),
             seconds: earlier.last.moment.since(earlier.begun.moment).as_secs_f64(),
             reason: reason.unwrap_or_else(|| "it ended".to_owned()),
-            kept: earlier.done.iter().filter(|test| joined::is_decided(test)).count(),
+            kept: earlier.done.iter().filter(|test| merge::is_decided(test)).count(),
             records: earlier.records - before,
         });
         all
@@ -67,7 +67,7 @@ impl RunJudge {
 
     /// What is left to do of a run that broke off: the planned tests that were not decided, in their order.
     pub fn left(&self) -> Vec<String> {
-        let undecided = self.tests().into_iter().filter(|test| !joined::is_decided(test));
+        let undecided = self.tests().into_iter().filter(|test| !merge::is_decided(test));
         let undecided: Vec<String> = undecided.map(|test| test.id).collect();
         let mut planned = self.planned();
         planned.retain(|id| undecided.contains(id));
@@ -85,14 +85,14 @@ impl RunJudge {
     }
 
     /// What monitors found in this run and in those before it.
-    pub(super) fn watched(&self) -> Vec<Watched> {
+    pub(super) fn watched(&self) -> Vec<MonitorReport> {
         let own = if self.is_stranger {
             Vec::new()
         } else {
             self.watches.results()
         };
         match &self.earlier {
-            Some(earlier) => joined::watched(earlier.watched(), own),
+            Some(earlier) => merge::watched(earlier.watched(), own),
             None => own,
         }
     }

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::{Holds, Position, Progress, StepOutcome, Timing, backlog, bound_clauses, ids, limit, seconds};
+use super::{ClauseOutcome, Position, Progress, StepOutcome, Timing, backlog, bound_clauses, ids, limit, seconds};
+use crate::eval_context::EvalContext;
 use crate::limit::Limit;
-use crate::mend::{Mends, is_lasting, status_meant};
-use crate::scene::Scene;
+use crate::repair::{StateRepair, is_lasting, status_meant};
 use tck_base::clock::Moment;
 use tck_base::diagnostic::Span;
 use tck_journal::Entry;
@@ -88,7 +88,12 @@ impl Track {
 }
 
 impl Walking {
-    pub(super) fn begin(verb: &ActionWalk, step: &Step, position: Position, scene: &Scene<'_>) -> Result<Self, String> {
+    pub(super) fn begin(
+        verb: &ActionWalk,
+        step: &Step,
+        position: Position,
+        scene: &EvalContext<'_>,
+    ) -> Result<Self, String> {
         let name = &verb.name;
         let text = |what: &str| scene.bindings.get(&format!("{name}.{what}"));
         let id = text("id").and_then(|value| value.as_str().map(str::to_owned));
@@ -110,7 +115,7 @@ impl Walking {
             last: None,
             seen: 0,
             names: Arc::clone(scene.pack.names()),
-            waivers: Mends::of(scene.waivers, TOPIC, &ids(&verb.checks)).into_waivers(),
+            waivers: StateRepair::of(scene.waivers, TOPIC, &ids(&verb.checks)).into_waivers(),
             meant: None,
             lasting: false,
         };
@@ -209,32 +214,38 @@ impl Walking {
         let stopped = !self.decided() && cut_short.is_none();
         let (holds, message) = if self.through.done() {
             match arrived.filter(|took| *took > self.limit.soft) {
-                Some(took) => (Holds::Late, format!("the action {became}, after {}", seconds(took))),
-                None => (Holds::Yes, format!("the action {became}")),
+                Some(took) => (
+                    ClauseOutcome::HeldLate,
+                    format!("the action {became}, after {}", seconds(took)),
+                ),
+                None => (ClauseOutcome::Held, format!("the action {became}")),
             }
         } else if self.lasting {
             (
-                Holds::Yes,
+                ClauseOutcome::Held,
                 format!("the action {became}, and is known to go no further"),
             )
         } else if self.tolerated.as_ref().is_some_and(Track::done) {
-            (Holds::Softly, format!("the action {became}, which a ruling tolerates"))
+            (
+                ClauseOutcome::Warning,
+                format!("the action {became}, which a ruling tolerates"),
+            )
         } else if let (true, Some(meant)) = (self.decided(), &self.meant) {
             let why = format!("the action {became}, which cannot be told, since {meant}");
-            (Holds::Unseen(why.clone()), why)
+            (ClauseOutcome::Unobservable(why.clone()), why)
         } else if self.decided() {
-            (Holds::No, format!("the action {became}"))
+            (ClauseOutcome::Violated, format!("the action {became}"))
         } else if let Some(why) = cut_short {
-            (Holds::Unseen(why.to_owned()), why.to_owned())
+            (ClauseOutcome::Unobservable(why.to_owned()), why.to_owned())
         } else if self.walked.is_empty() {
             let message = format!(
                 "the action never showed up in actionStates ({} states within {waited})",
                 self.seen
             );
-            (Holds::No, message)
+            (ClauseOutcome::Violated, message)
         } else {
             (
-                Holds::No,
+                ClauseOutcome::Violated,
                 format!("the action {became} and went no further within {waited}"),
             )
         };
@@ -254,7 +265,10 @@ impl Walking {
             let value = path.of(message_json?)?;
             Some((name.clone(), value.clone()))
         });
-        let fine = matches!(holds, Holds::Yes | Holds::Late | Holds::Softly);
+        let fine = matches!(
+            holds,
+            ClauseOutcome::Held | ClauseOutcome::HeldLate | ClauseOutcome::Warning
+        );
         StepOutcome {
             reached: Some(if fine { Ok(()) } else { Err(message) }),
             took: seq,

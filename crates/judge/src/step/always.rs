@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use super::answer::Question;
 use super::{
-    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, Timing, backlog, bound_clauses, ids, keep_nearest,
-    limit, seconds, shown_path,
+    Clause, ClauseOutcome, Near, Position, Progress, Selector, StepOutcome, Timing, backlog, bound_clauses, ids,
+    keep_nearest, limit, seconds, shown_path,
 };
+use crate::eval_context::EvalContext;
 use crate::limit::Limit;
-use crate::scene::Scene;
-use crate::window::{CheckWindow, Said};
+use crate::window::{CheckOutcome, CheckWindow};
 use tck_base::clock::Moment;
 use tck_journal::Entry;
 use tck_suite::model::{Always, Extent, From, Step, Until};
@@ -26,7 +26,7 @@ pub(crate) struct Holding {
     /// What a check of several requirements has found broken of one: the others are still looked at.
     found: Option<Violation>,
     /// What a check remarked on without ending the step.
-    remarked: Option<(u64, Holds, String)>,
+    remarked: Option<(u64, ClauseOutcome, String)>,
     /// Whether the check had anything to judge.
     judged: bool,
 }
@@ -44,13 +44,18 @@ struct Goal {
 
 struct Violation {
     seq: u64,
-    holds: Holds,
+    holds: ClauseOutcome,
     message: String,
     near: Option<Near>,
 }
 
 impl Holding {
-    pub(super) fn begin(verb: &Always, step: &Step, position: Position, scene: &Scene<'_>) -> Result<Self, String> {
+    pub(super) fn begin(
+        verb: &Always,
+        step: &Step,
+        position: Position,
+        scene: &EvalContext<'_>,
+    ) -> Result<Self, String> {
         let mut selector = Selector::bind(&verb.selection, &verb.subject(), &step.verb_span, position, scene)?.lenient(
             &verb.subject(),
             &ids(&verb.checks),
@@ -101,7 +106,7 @@ impl Holding {
         Ok(this)
     }
 
-    pub(super) fn observe(&mut self, entry: &Arc<Entry>, subject: Option<&str>, scene: &Scene<'_>) {
+    pub(super) fn observe(&mut self, entry: &Arc<Entry>, subject: Option<&str>, scene: &EvalContext<'_>) {
         if self.decided() || entry.at().moment > self.ends {
             return;
         }
@@ -134,10 +139,10 @@ impl Holding {
         }
     }
 
-    fn judge(&mut self, entry: &Arc<Entry>, scene: &Scene<'_>) {
+    fn judge(&mut self, entry: &Arc<Entry>, scene: &EvalContext<'_>) {
         let said = self.check.as_mut().map(|check| check.observe(entry, scene));
-        self.judged |= said.as_ref().is_some_and(|said| *said != Said::Nothing);
-        if let Some(Said::Wrong(holds, found)) = said {
+        self.judged |= said.as_ref().is_some_and(|said| *said != CheckOutcome::Nothing);
+        if let Some(CheckOutcome::Wrong(holds, found)) = said {
             let message = format!("#{}: {found}", entry.seq());
             self.remark(entry.seq(), holds, message);
         }
@@ -157,7 +162,7 @@ impl Holding {
             };
             self.violated = Some(Violation {
                 seq: entry.seq(),
-                holds: Holds::No,
+                holds: ClauseOutcome::Violated,
                 message,
                 near,
             });
@@ -166,8 +171,8 @@ impl Holding {
 
     /// Keeps what the check found: a violation ends the step, unless it names the one of several requirements that it is
     /// about; anything softer waits for the end.
-    fn remark(&mut self, seq: u64, holds: Holds, message: String) {
-        if holds == Holds::No {
+    fn remark(&mut self, seq: u64, holds: ClauseOutcome, message: String) {
+        if holds == ClauseOutcome::Violated {
             let check = self.check.as_ref();
             let is_sorted = check.is_some_and(|check| check.sorted(&self.verb.checks).is_some());
             let kept = match is_sorted && self.verb.checks.len() > 1 {
@@ -180,7 +185,7 @@ impl Holding {
                 message,
                 near: None,
             });
-        } else if self.remarked.is_none() || matches!(holds, Holds::Unseen(_)) {
+        } else if self.remarked.is_none() || matches!(holds, ClauseOutcome::Unobservable(_)) {
             self.remarked = Some((seq, holds, message));
         }
     }
@@ -213,14 +218,14 @@ impl Holding {
         }
     }
 
-    pub(super) fn end(mut self, at: Moment, cut_short: Option<&str>, scene: &Scene<'_>) -> StepOutcome {
+    pub(super) fn end(mut self, at: Moment, cut_short: Option<&str>, scene: &EvalContext<'_>) -> StepOutcome {
         if let Some((holds, found)) = self.check.as_mut().and_then(|check| check.finish(at, scene)) {
             self.judged = true;
             self.remark(0, holds, found);
         }
         let mut clauses = Vec::new();
         let (holds, message, witness) = self.held(cut_short);
-        let mut reached = if matches!(holds, Holds::Yes | Holds::Softly) {
+        let mut reached = if matches!(holds, ClauseOutcome::Held | ClauseOutcome::Warning) {
             Ok(())
         } else {
             Err(message.clone())
@@ -271,25 +276,25 @@ impl Holding {
         let ended = self.violated.is_some();
         for (clause, found) in clauses.iter_mut().zip(sorted) {
             match found {
-                Some((seq, Said::Wrong(holds, message))) => {
+                Some((seq, CheckOutcome::Wrong(holds, message))) => {
                     clause.holds = holds;
                     clause.witness = Some(seq).filter(|seq| *seq > 0);
                     clause.message = format!("#{seq}: {message}");
                 }
                 _ if ended || cut_short.is_some() => {
                     let why = cut_short.unwrap_or("the step ended with what was found about another requirement");
-                    clause.holds = Holds::Unseen(why.to_owned());
+                    clause.holds = ClauseOutcome::Unobservable(why.to_owned());
                     why.clone_into(&mut clause.message);
                 }
                 _ => {
-                    clause.holds = Holds::Yes;
+                    clause.holds = ClauseOutcome::Held;
                     clause.message = format!("all {} {} messages match", self.seen, self.verb.topic);
                 }
             }
         }
     }
 
-    fn held(&self, cut_short: Option<&str>) -> (Holds, String, Option<u64>) {
+    fn held(&self, cut_short: Option<&str>) -> (ClauseOutcome, String, Option<u64>) {
         if let Some(violation) = self.violated.as_ref().or(self.found.as_ref()) {
             return (
                 violation.holds.clone(),
@@ -298,7 +303,7 @@ impl Holding {
             );
         }
         if let Some(why) = cut_short {
-            return (Holds::Unseen(why.to_owned()), why.to_owned(), None);
+            return (ClauseOutcome::Unobservable(why.to_owned()), why.to_owned(), None);
         }
         if let Some((seq, holds, message)) = &self.remarked {
             return (holds.clone(), message.clone(), Some(*seq).filter(|seq| *seq > 0));
@@ -306,13 +311,17 @@ impl Holding {
         match self.seen {
             n if n > 0 && self.check.is_some() && !self.judged => {
                 let why = format!("none of {n} {} messages shows what is to be judged", self.verb.topic);
-                (Holds::Unseen(why.clone()), why, None)
+                (ClauseOutcome::Unobservable(why.clone()), why, None)
             }
             0 => {
                 let why = format!("no {} message came that could have been judged", self.verb.topic);
-                (Holds::Unseen(why.clone()), why, None)
+                (ClauseOutcome::Unobservable(why.clone()), why, None)
             }
-            n => (Holds::Yes, format!("all {n} {} messages match", self.verb.topic), None),
+            n => (
+                ClauseOutcome::Held,
+                format!("all {n} {} messages match", self.verb.topic),
+                None,
+            ),
         }
     }
 }
@@ -330,16 +339,16 @@ impl Goal {
             (Some((seq, moment)), _) => {
                 let took = moment.since(position.base);
                 let holds = if took > self.limit.soft {
-                    Holds::Late
+                    ClauseOutcome::HeldLate
                 } else {
-                    Holds::Yes
+                    ClauseOutcome::Held
                 };
                 (holds, format!("#{seq} came after {}", seconds(took)), Some(seq))
             }
-            (None, Some(why)) => (Holds::Unseen(why.to_owned()), why.to_owned(), None),
+            (None, Some(why)) => (ClauseOutcome::Unobservable(why.to_owned()), why.to_owned(), None),
             (None, None) if violated => {
                 let why = "not judged: the condition before it failed";
-                (Holds::Unseen(why.to_owned()), why.to_owned(), None)
+                (ClauseOutcome::Unobservable(why.to_owned()), why.to_owned(), None)
             }
             (None, None) => {
                 let message = format!(
@@ -348,7 +357,7 @@ impl Goal {
                     self.until.topic,
                     seconds(waited)
                 );
-                (Holds::No, message, None)
+                (ClauseOutcome::Violated, message, None)
             }
         };
         let span = self
@@ -356,7 +365,10 @@ impl Goal {
             .as_ref()
             .and_then(|near| near.span.clone())
             .unwrap_or_else(|| self.selector.span.clone());
-        let nearest = self.nearest.and_then(|near| near.miss).filter(|_| holds == Holds::No);
+        let nearest = self
+            .nearest
+            .and_then(|near| near.miss)
+            .filter(|_| holds == ClauseOutcome::Violated);
         let mut clauses = bound_clauses(&self.until.checks, "until", &span, &holds, witness, &message);
         for clause in &mut clauses {
             clause.expected = self.selector.expected();

@@ -9,8 +9,8 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use super::{Clause, Holds, Position, Selector, StepOutcome, bind_pattern};
-use crate::scene::Scene;
+use super::{Clause, ClauseOutcome, Position, Selector, StepOutcome, bind_pattern};
+use crate::eval_context::EvalContext;
 use tck_base::pattern::Bound;
 use tck_journal::Entry;
 use tck_journal::event::Event;
@@ -42,7 +42,7 @@ impl Question {
     }
 
     /// Whether a message that the step picks is the answer.
-    pub(super) fn is_answered_by(&self, entry: &Entry, selector: &Selector, scene: &Scene<'_>) -> bool {
+    pub(super) fn is_answered_by(&self, entry: &Entry, selector: &Selector, scene: &EvalContext<'_>) -> bool {
         let picking = selector.pattern.iter().filter(|pattern| pattern.looks_back());
         let patterns: Vec<&Bound> = picking.chain(&self.asked).collect();
         let Some(message) = entry.subject().filter(|_| !patterns.is_empty()) else {
@@ -77,7 +77,7 @@ impl Question {
         mut elements: Vec<&Value>,
         pattern: &Bound,
         message: &Value,
-        scene: &Scene<'_>,
+        scene: &EvalContext<'_>,
     ) -> bool {
         let all = scene.timeline.of(&self.topic);
         let before = &all[..all.partition_point(|entry| entry.seq() < self.mark)];
@@ -115,7 +115,7 @@ pub(super) struct FirstAnswer {
 }
 
 impl FirstAnswer {
-    pub(super) fn of(verb: &Expect, position: Position, scene: &Scene<'_>) -> Self {
+    pub(super) fn of(verb: &Expect, position: Position, scene: &EvalContext<'_>) -> Self {
         let bound = |assertion: &Assertion| {
             let bound = bind_pattern(assertion.selection.pattern.as_ref(), scene).ok()??;
             bound.looks_back().then_some(bound)
@@ -141,7 +141,7 @@ impl FirstAnswer {
         outcome: StepOutcome,
         entry: &Entry,
         selector: &Selector,
-        scene: &Scene<'_>,
+        scene: &EvalContext<'_>,
     ) -> Option<StepOutcome> {
         let shows_all = !self.question.asked.is_empty() && !outcome.clauses.iter().any(is_missed);
         if shows_all || self.question.is_answered_by(entry, selector, scene) {
@@ -170,7 +170,7 @@ impl FirstAnswer {
         outcome.seen = seen;
         if let Some(why) = cut_short {
             for clause in outcome.clauses.iter_mut().filter(|clause| is_missed(clause)) {
-                clause.holds = Holds::Unseen(why.to_owned());
+                clause.holds = ClauseOutcome::Unobservable(why.to_owned());
                 why.clone_into(&mut clause.message);
             }
         }
@@ -180,11 +180,12 @@ impl FirstAnswer {
 
 /// Whether the message does not show what is asserted or preferred.
 fn is_missed(clause: &Clause) -> bool {
-    matches!(clause.word, "assert" | "prefer") && matches!(clause.holds, Holds::No | Holds::Softly)
+    matches!(clause.word, "assert" | "prefer")
+        && matches!(clause.holds, ClauseOutcome::Violated | ClauseOutcome::Warning)
 }
 
 /// Whether the stimulus was a hook: what an operator provokes may be what he has provoked before, in the same words.
-fn was_provoked(mark: u64, scene: &Scene<'_>) -> bool {
+fn was_provoked(mark: u64, scene: &EvalContext<'_>) -> bool {
     let mut since = scene.entries.iter().rev().take_while(|entry| entry.seq() >= mark);
     since.any(|entry| matches!(entry.event(), Event::Hook { ok: true, .. }))
 }
@@ -214,7 +215,7 @@ fn is_reworded(one: &Value, other: &Value) -> bool {
 
 /// Whether one of the elements repeats something of what was sent that was in no state before: a text, such as the
 /// identifier of an order or of an action, or a number under its name, such as the orderUpdateId.
-fn name_what_was_sent(elements: &[&Value], mark: u64, selector: &Selector, scene: &Scene<'_>) -> bool {
+fn name_what_was_sent(elements: &[&Value], mark: u64, selector: &Selector, scene: &EvalContext<'_>) -> bool {
     if elements.is_empty() {
         return false;
     }

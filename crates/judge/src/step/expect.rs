@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use super::answer::FirstAnswer;
 use super::{
-    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, Timing, assertion_clause, backlog, bound_clauses,
-    ids, keep_nearest, limit, seconds,
+    Clause, ClauseOutcome, Near, Position, Progress, Selector, StepOutcome, Timing, assertion_clause, backlog,
+    bound_clauses, ids, keep_nearest, limit, seconds,
 };
+use crate::eval_context::EvalContext;
 use crate::limit::Limit;
-use crate::scene::Scene;
 use tck_base::clock::Moment;
 use tck_journal::Entry;
 use tck_suite::model::{Expect, From, Step};
@@ -29,7 +29,12 @@ pub(crate) struct Expecting {
 }
 
 impl Expecting {
-    pub(super) fn begin(verb: &Expect, step: &Step, position: Position, scene: &Scene<'_>) -> Result<Self, String> {
+    pub(super) fn begin(
+        verb: &Expect,
+        step: &Step,
+        position: Position,
+        scene: &EvalContext<'_>,
+    ) -> Result<Self, String> {
         let limit = limit(&verb.within, scene)?;
         let mut this = Self {
             selector: Selector::bind(&verb.selection, &verb.subject(), &step.verb_span, position, scene)?.lenient(
@@ -62,13 +67,13 @@ impl Expecting {
         Ok(this)
     }
 
-    pub(super) fn observe(&mut self, entry: &Arc<Entry>, subject: Option<&str>, scene: &Scene<'_>) {
+    pub(super) fn observe(&mut self, entry: &Arc<Entry>, subject: Option<&str>, scene: &EvalContext<'_>) {
         if subject == Some(&*self.verb.subject()) {
             self.look_at(entry, scene, false);
         }
     }
 
-    fn look_at(&mut self, entry: &Arc<Entry>, scene: &Scene<'_>, whenever: bool) {
+    fn look_at(&mut self, entry: &Arc<Entry>, scene: &EvalContext<'_>, whenever: bool) {
         if self.taken.is_some() {
             return;
         }
@@ -85,7 +90,7 @@ impl Expecting {
         self.take(entry, at, whenever, scene);
     }
 
-    fn take(&mut self, entry: &Arc<Entry>, at: Moment, whenever: bool, scene: &Scene<'_>) {
+    fn take(&mut self, entry: &Arc<Entry>, at: Moment, whenever: bool, scene: &EvalContext<'_>) {
         let took = at.since(self.position.base);
         let late = took > self.limit.soft && !whenever;
         if late {
@@ -98,9 +103,12 @@ impl Expecting {
                 seconds(took),
                 seconds(self.limit.soft)
             );
-            (Holds::Late, message)
+            (ClauseOutcome::HeldLate, message)
         } else {
-            (Holds::Yes, format!("#{} came after {}", entry.seq(), seconds(took)))
+            (
+                ClauseOutcome::Held,
+                format!("#{} came after {}", entry.seq(), seconds(took)),
+            )
         };
         let mut clauses = bound_clauses(
             &self.verb.checks,
@@ -170,8 +178,8 @@ impl Expecting {
         }
         let waited = at.since(self.position.base);
         let (holds, message) = match cut_short {
-            Some(why) => (Holds::Unseen(why.to_owned()), why.to_owned()),
-            None => (Holds::No, self.missed(waited)),
+            Some(why) => (ClauseOutcome::Unobservable(why.to_owned()), why.to_owned()),
+            None => (ClauseOutcome::Violated, self.missed(waited)),
         };
         let span = self
             .nearest
@@ -207,7 +215,7 @@ impl Expecting {
                 word,
                 span: assertion.span.clone(),
                 label: String::new(),
-                holds: Holds::Unseen(unseen.to_owned()),
+                holds: ClauseOutcome::Unobservable(unseen.to_owned()),
                 witness: None,
                 message: unseen.to_owned(),
                 expected: None,

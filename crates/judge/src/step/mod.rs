@@ -16,13 +16,13 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-pub use super::holds::Holds;
-use super::holds::unbound_text;
+pub use super::clause_outcome::ClauseOutcome;
+use super::clause_outcome::unbound_text;
+use super::eval_context::EvalContext;
 use super::limit::Limit;
-use super::mend::Mends;
-use super::scene::Scene;
+use super::repair::StateRepair;
 use super::timeline::Timeline;
-use super::window::{CheckWindow, Said};
+use super::window::{CheckOutcome, CheckWindow};
 use tck_base::clock::Moment;
 use tck_base::diagnostic::Span;
 use tck_base::pattern::{Bound, Pattern};
@@ -71,7 +71,7 @@ pub struct Clause {
     /// What stands at the caret.
     pub label: String,
     /// How it came out.
-    pub holds: Holds,
+    pub holds: ClauseOutcome,
     /// The entry that decided it.
     pub witness: Option<u64>,
     /// One line.
@@ -161,7 +161,7 @@ pub(super) enum Evaluator {
 
 impl Evaluator {
     /// Begins a step. Entries that are already in the timeline are looked at right away.
-    pub(super) fn begin(step: &Step, position: Position, scene: &Scene<'_>) -> Self {
+    pub(super) fn begin(step: &Step, position: Position, scene: &EvalContext<'_>) -> Self {
         let begun = match &step.verb {
             Verb::Expect(verb) => expect::Expecting::begin(verb, step, position, scene).map(Self::Expect),
             Verb::Never(verb) => never::Forbidding::begin(verb, step, position, scene).map(Self::Never),
@@ -176,7 +176,7 @@ impl Evaluator {
                 word: word_of(&path),
                 span: step.verb_span.clone(),
                 label: String::new(),
-                holds: Holds::Unseen(why.clone()),
+                holds: ClauseOutcome::Unobservable(why.clone()),
                 witness: None,
                 message: why.clone(),
                 expected: None,
@@ -191,7 +191,7 @@ impl Evaluator {
     }
 
     /// Looks at one more entry of the step.
-    pub(super) fn observe(&mut self, entry: &Arc<Entry>, subject: Option<&str>, scene: &Scene<'_>) {
+    pub(super) fn observe(&mut self, entry: &Arc<Entry>, subject: Option<&str>, scene: &EvalContext<'_>) {
         match self {
             Self::Plain | Self::Unbound(_) => {}
             Self::Expect(step) => step.observe(entry, subject, scene),
@@ -214,7 +214,7 @@ impl Evaluator {
     }
 
     /// The step has ended at `at`; `cut_short` when it was not the deadline that ended it.
-    pub(super) fn end(self, at: Moment, cut_short: Option<&str>, scene: &Scene<'_>) -> StepOutcome {
+    pub(super) fn end(self, at: Moment, cut_short: Option<&str>, scene: &EvalContext<'_>) -> StepOutcome {
         let allowances = self.allowances();
         let timing = self.timing();
         let mut outcome = match self {
@@ -267,7 +267,7 @@ pub(super) struct Selector {
     pub(super) check: Option<tck_suite::model::CheckUse>,
     pub(super) baseline: Option<Value>,
     pub(super) span: Span,
-    mends: Mends,
+    mends: StateRepair,
 }
 
 impl Selector {
@@ -276,7 +276,7 @@ impl Selector {
         subject: &str,
         fallback: &Span,
         position: Position,
-        scene: &Scene<'_>,
+        scene: &EvalContext<'_>,
     ) -> Result<Self, String> {
         let pattern = bind_pattern(selection.pattern.as_ref(), scene)?;
         let span = match (&selection.pattern, &selection.check) {
@@ -289,18 +289,18 @@ impl Selector {
             check: selection.check.clone(),
             baseline: scene.timeline.baseline(subject, position.mark),
             span,
-            mends: Mends::default(),
+            mends: StateRepair::default(),
         })
     }
 
     /// From now on the states are read as they are meant, except for what is about a mistake of the vehicle itself.
-    pub(super) fn lenient(mut self, subject: &str, decides: &[&RequirementId], scene: &Scene<'_>) -> Self {
-        self.mends = Mends::of(scene.waivers, subject, decides);
+    pub(super) fn lenient(mut self, subject: &str, decides: &[&RequirementId], scene: &EvalContext<'_>) -> Self {
+        self.mends = StateRepair::of(scene.waivers, subject, decides);
         self
     }
 
     /// Its named check, to be shown every message.
-    pub(super) fn take_check(&mut self, scene: &Scene<'_>) -> Result<Option<CheckWindow>, String> {
+    pub(super) fn take_check(&mut self, scene: &EvalContext<'_>) -> Result<Option<CheckWindow>, String> {
         let Some(check) = self.check.take() else {
             return Ok(None);
         };
@@ -314,7 +314,7 @@ impl Selector {
     }
 
     /// Whether a message is what is looked for. A named check looks at everything since the test began.
-    pub(super) fn takes(&self, entry: &Entry, scene: &Scene<'_>) -> bool {
+    pub(super) fn takes(&self, entry: &Entry, scene: &EvalContext<'_>) -> bool {
         let matches = match &self.pattern {
             None => entry.subject().is_some(),
             Some(pattern) => entry.subject().is_some_and(|message| {
@@ -322,21 +322,23 @@ impl Selector {
                 takes(&message) || self.mends.make_up_for(entry, scene, takes)
             }),
         };
-        matches && !matches!(self.check_says(entry, scene), Said::Wrong(..))
+        matches && !matches!(self.check_says(entry, scene), CheckOutcome::Wrong(..))
     }
 
     /// Whether a message is what is looked for only for a lasting mistake of the vehicle.
-    pub(super) fn is_excused(&self, entry: &Entry, scene: &Scene<'_>) -> bool {
+    pub(super) fn is_excused(&self, entry: &Entry, scene: &EvalContext<'_>) -> bool {
         let Some(pattern) = &self.pattern else { return false };
         let takes = |message: &Value| pattern.matches(message, self.baseline.as_ref());
         self.mends.make_up_for(entry, scene, |message: &Value| !takes(message))
     }
 
     /// What the named check says about this entry; right where there is no check.
-    fn check_says(&self, entry: &Entry, scene: &Scene<'_>) -> Said {
-        let Some(check) = &self.check else { return Said::Right };
+    fn check_says(&self, entry: &Entry, scene: &EvalContext<'_>) -> CheckOutcome {
+        let Some(check) = &self.check else {
+            return CheckOutcome::Right;
+        };
         match CheckWindow::start(check, scene) {
-            Err(why) => Said::Wrong(Holds::Unseen(why.clone()), why),
+            Err(why) => CheckOutcome::Wrong(ClauseOutcome::Unobservable(why.clone()), why),
             Ok(window) => window.lenient(self.mends.clone()).observe(entry, scene),
         }
     }
@@ -393,14 +395,14 @@ pub(super) fn keep_nearest(best: &mut Option<Near>, candidate: Option<Near>) {
     }
 }
 
-pub(super) fn bind_pattern(pattern: Option<&Pattern>, scene: &Scene<'_>) -> Result<Option<Bound>, String> {
+pub(super) fn bind_pattern(pattern: Option<&Pattern>, scene: &EvalContext<'_>) -> Result<Option<Bound>, String> {
     pattern
         .map(|pattern| pattern.bind(scene.bindings))
         .transpose()
         .map_err(|unbound| unbound_text(&unbound))
 }
 
-pub(super) fn limit(time: &tck_suite::model::TimeTerm, scene: &Scene<'_>) -> Result<Limit, String> {
+pub(super) fn limit(time: &tck_suite::model::TimeTerm, scene: &EvalContext<'_>) -> Result<Limit, String> {
     Limit::resolve(time, scene.bindings).ok_or_else(|| "a time limit has no value".to_owned())
 }
 
@@ -414,7 +416,7 @@ pub(super) fn bound_clauses(
     bindings: &[Binding],
     word: &'static str,
     span: &Span,
-    holds: &Holds,
+    holds: &ClauseOutcome,
     witness: Option<u64>,
     message: &str,
 ) -> Vec<Clause> {
@@ -441,14 +443,14 @@ pub(super) fn assertion_clause(
     entry: &Entry,
     subject: &str,
     position: Position,
-    scene: &Scene<'_>,
+    scene: &EvalContext<'_>,
 ) -> Clause {
     let mut clause = Clause {
         requirement: assertion.requirement.clone(),
         word,
         span: assertion.span.clone(),
         label: String::new(),
-        holds: Holds::Yes,
+        holds: ClauseOutcome::Held,
         witness: Some(entry.seq()),
         message: format!("#{} shows it", entry.seq()),
         expected: None,
@@ -457,7 +459,7 @@ pub(super) fn assertion_clause(
     let selector = match Selector::bind(&assertion.selection, subject, &assertion.span, position, scene) {
         Ok(selector) => selector.lenient(subject, &[&assertion.requirement], scene),
         Err(why) => {
-            clause.holds = Holds::Unseen(why.clone());
+            clause.holds = ClauseOutcome::Unobservable(why.clone());
             clause.message = why;
             return clause;
         }
@@ -465,14 +467,18 @@ pub(super) fn assertion_clause(
     clause.expected = selector.expected();
     let said = selector.check_says(entry, scene);
     if selector.takes(entry, scene) {
-        if said == Said::Nothing {
+        if said == CheckOutcome::Nothing {
             let why = "the message does not show what is to be judged".to_owned();
-            clause.holds = Holds::Unseen(why.clone());
+            clause.holds = ClauseOutcome::Unobservable(why.clone());
             clause.message = why;
         }
         return clause;
     }
-    clause.holds = if word == "prefer" { Holds::Softly } else { Holds::No };
+    clause.holds = if word == "prefer" {
+        ClauseOutcome::Warning
+    } else {
+        ClauseOutcome::Violated
+    };
     match selector.closeness(entry).filter(|near| near.miss.is_some()) {
         Some(near) => {
             if let Some(span) = near.span {
@@ -492,8 +498,8 @@ pub(super) fn assertion_clause(
         }
         None => {
             let mut found = "does not hold".to_owned();
-            if let Said::Wrong(holds, why) = said {
-                if clause.holds == Holds::No {
+            if let CheckOutcome::Wrong(holds, why) = said {
+                if clause.holds == ClauseOutcome::Violated {
                     clause.holds = holds;
                 }
                 found = why;

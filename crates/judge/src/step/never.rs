@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{Holds, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, ids, limit, seconds};
-use crate::scene::Scene;
-use crate::window::{CheckWindow, Said};
+use super::{ClauseOutcome, Position, Progress, Selector, StepOutcome, backlog, bound_clauses, ids, limit, seconds};
+use crate::eval_context::EvalContext;
+use crate::window::{CheckOutcome, CheckWindow};
 use tck_base::clock::Moment;
 use tck_journal::Entry;
 use tck_journal::event::Event;
@@ -20,12 +20,17 @@ pub(crate) struct Forbidding {
     seen: u64,
     violated: Option<(u64, String)>,
     /// What a check remarked on, or could not judge, without ending the step.
-    remarked: Option<(u64, Holds, String)>,
+    remarked: Option<(u64, ClauseOutcome, String)>,
     alive: bool,
 }
 
 impl Forbidding {
-    pub(super) fn begin(verb: &Never, step: &Step, position: Position, scene: &Scene<'_>) -> Result<Self, String> {
+    pub(super) fn begin(
+        verb: &Never,
+        step: &Step,
+        position: Position,
+        scene: &EvalContext<'_>,
+    ) -> Result<Self, String> {
         let during = limit(&verb.during, scene)?.hard;
         let ends = position.begun + during;
         let patience = scene
@@ -57,7 +62,7 @@ impl Forbidding {
         Ok(this)
     }
 
-    pub(super) fn observe(&mut self, entry: &Arc<Entry>, subject: Option<&str>, scene: &Scene<'_>) {
+    pub(super) fn observe(&mut self, entry: &Arc<Entry>, subject: Option<&str>, scene: &EvalContext<'_>) {
         if matches!(entry.event(), Event::ProbeReceived { .. }) && entry.at().moment >= self.ends {
             self.alive = true;
         }
@@ -66,7 +71,7 @@ impl Forbidding {
         }
     }
 
-    fn look_at(&mut self, entry: &Arc<Entry>, scene: &Scene<'_>) {
+    fn look_at(&mut self, entry: &Arc<Entry>, scene: &EvalContext<'_>) {
         if self.violated.is_some() {
             return;
         }
@@ -74,7 +79,7 @@ impl Forbidding {
         if let Some(check) = &mut self.check {
             // The check has to see everything; what it says counts where the message is one of those meant.
             let said = check.observe(entry, scene);
-            if let Said::Wrong(holds, found) = said
+            if let CheckOutcome::Wrong(holds, found) = said
                 && self.selector.takes(entry, scene)
             {
                 self.found(entry.seq(), holds, found);
@@ -93,17 +98,17 @@ impl Forbidding {
     }
 
     /// Keeps what the check found: a violation ends the step, anything softer waits for the end.
-    fn found(&mut self, seq: u64, holds: Holds, found: String) {
+    fn found(&mut self, seq: u64, holds: ClauseOutcome, found: String) {
         match holds {
-            Holds::No => self.violated = Some((seq, found)),
-            Holds::Yes => {}
+            ClauseOutcome::Violated => self.violated = Some((seq, found)),
+            ClauseOutcome::Held => {}
             // What could not be judged weighs more than a remark, as everywhere.
             softer => {
-                let weightier = matches!(softer, Holds::Unseen(_));
+                let weightier = matches!(softer, ClauseOutcome::Unobservable(_));
                 if self
                     .remarked
                     .as_ref()
-                    .is_none_or(|(_, before, _)| weightier && !matches!(before, Holds::Unseen(_)))
+                    .is_none_or(|(_, before, _)| weightier && !matches!(before, ClauseOutcome::Unobservable(_)))
                 {
                     self.remarked = Some((seq, softer, found));
                 }
@@ -124,28 +129,28 @@ impl Forbidding {
         self.probe_until
     }
 
-    pub(super) fn end(mut self, at: Moment, cut_short: Option<&str>, scene: &Scene<'_>) -> StepOutcome {
+    pub(super) fn end(mut self, at: Moment, cut_short: Option<&str>, scene: &EvalContext<'_>) -> StepOutcome {
         let last = self.check.as_mut().and_then(|check| check.finish(at, scene));
         if let Some((holds, found)) = last.filter(|_| self.violated.is_none()) {
             self.found(0, holds, found);
         }
         let (holds, message, witness) = match (self.violated, cut_short) {
-            (Some((seq, message)), _) => (Holds::No, message, Some(seq).filter(|seq| *seq > 0)),
+            (Some((seq, message)), _) => (ClauseOutcome::Violated, message, Some(seq).filter(|seq| *seq > 0)),
             (None, None) if self.alive && self.remarked.is_some() => {
-                let (seq, holds, message) = self.remarked.unwrap_or((0, Holds::Yes, String::new()));
+                let (seq, holds, message) = self.remarked.unwrap_or((0, ClauseOutcome::Held, String::new()));
                 (holds, message, Some(seq).filter(|seq| *seq > 0))
             }
-            (None, Some(why)) => (Holds::Unseen(why.to_owned()), why.to_owned(), None),
+            (None, Some(why)) => (ClauseOutcome::Unobservable(why.to_owned()), why.to_owned(), None),
             (None, None) if self.alive => {
                 let message = format!(
                     "nothing of the kind came for {}",
                     seconds(at.since(self.position.begun))
                 );
-                (Holds::Yes, message, None)
+                (ClauseOutcome::Held, message, None)
             }
             (None, None) => {
                 let why = "the harness could not prove that it was listening: its own probe did not come back";
-                (Holds::Unseen(why.to_owned()), why.to_owned(), None)
+                (ClauseOutcome::Unobservable(why.to_owned()), why.to_owned(), None)
             }
         };
         let mut clauses = bound_clauses(
@@ -164,7 +169,7 @@ impl Forbidding {
                 .map(|conditions| format!("no message where {conditions}"));
         }
         StepOutcome {
-            reached: Some(if matches!(holds, Holds::Yes | Holds::Softly) {
+            reached: Some(if matches!(holds, ClauseOutcome::Held | ClauseOutcome::Warning) {
                 Ok(())
             } else {
                 Err(message)

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::{
-    Clause, Holds, Near, Position, Progress, Selector, StepOutcome, assertion_clause, bound_clauses, keep_nearest,
-    limit,
+    Clause, ClauseOutcome, Near, Position, Progress, Selector, StepOutcome, assertion_clause, bound_clauses,
+    keep_nearest, limit,
 };
-use crate::scene::Scene;
+use crate::eval_context::EvalContext;
 use tck_base::clock::Moment;
 use tck_journal::Entry;
 use tck_journal::event::Event;
@@ -27,7 +27,12 @@ pub(crate) struct Fetching {
 }
 
 impl Fetching {
-    pub(super) fn begin(verb: &Retained, step: &Step, position: Position, scene: &Scene<'_>) -> Result<Self, String> {
+    pub(super) fn begin(
+        verb: &Retained,
+        step: &Step,
+        position: Position,
+        scene: &EvalContext<'_>,
+    ) -> Result<Self, String> {
         let selector = Selector::bind(&verb.selection, &verb.topic, &step.verb_span, position, scene)?;
         Ok(Self {
             topic: scene.topics.get(&verb.topic).cloned(),
@@ -44,7 +49,7 @@ impl Fetching {
         })
     }
 
-    pub(super) fn observe(&mut self, entry: &Arc<Entry>, scene: &Scene<'_>) {
+    pub(super) fn observe(&mut self, entry: &Arc<Entry>, scene: &EvalContext<'_>) {
         match entry.event() {
             Event::Retained { topic, retain, .. } if Some(topic) == self.topic.as_ref() && self.taken.is_none() => {
                 self.seen += 1;
@@ -79,22 +84,37 @@ impl Fetching {
         let topic = &self.verb.topic;
         let (holds, message, witness) = match (self.taken, cut_short) {
             (Some(seq), _) => (
-                Holds::Yes,
+                ClauseOutcome::Held,
                 format!("a fresh subscriber received #{seq} with RETAIN set"),
                 Some(seq),
             ),
             (None, _) if self.ended => match (self.unflagged, self.seen) {
-                (Some(seq), _) => (Holds::No, format!("#{seq} came without RETAIN"), Some(seq)),
-                (None, 0) => (Holds::No, format!("the broker has no retained {topic} message"), None),
-                (None, _) => (Holds::No, format!("the retained {topic} message does not match"), None),
+                (Some(seq), _) => (
+                    ClauseOutcome::Violated,
+                    format!("#{seq} came without RETAIN"),
+                    Some(seq),
+                ),
+                (None, 0) => (
+                    ClauseOutcome::Violated,
+                    format!("the broker has no retained {topic} message"),
+                    None,
+                ),
+                (None, _) => (
+                    ClauseOutcome::Violated,
+                    format!("the retained {topic} message does not match"),
+                    None,
+                ),
             },
-            (None, Some(why)) => (Holds::Unseen(why.to_owned()), why.to_owned(), None),
+            (None, Some(why)) => (ClauseOutcome::Unobservable(why.to_owned()), why.to_owned(), None),
             (None, None) => {
                 let why = "the broker did not answer a fresh subscriber in time";
-                (Holds::Unseen(why.to_owned()), why.to_owned(), None)
+                (ClauseOutcome::Unobservable(why.to_owned()), why.to_owned(), None)
             }
         };
-        let nearest = self.nearest.and_then(|near| near.miss).filter(|_| holds == Holds::No);
+        let nearest = self
+            .nearest
+            .and_then(|near| near.miss)
+            .filter(|_| holds == ClauseOutcome::Violated);
         let mut clauses = bound_clauses(
             &self.verb.checks,
             "checks",
@@ -117,7 +137,7 @@ impl Fetching {
                 word: "assert",
                 span: assertion.span.clone(),
                 label: String::new(),
-                holds: Holds::Unseen(unseen.to_owned()),
+                holds: ClauseOutcome::Unobservable(unseen.to_owned()),
                 witness: None,
                 message: unseen.to_owned(),
                 expected: None,
@@ -125,7 +145,11 @@ impl Fetching {
             }));
         }
         StepOutcome {
-            reached: Some(if holds == Holds::Yes { Ok(()) } else { Err(message) }),
+            reached: Some(if holds == ClauseOutcome::Held {
+                Ok(())
+            } else {
+                Err(message)
+            }),
             took: witness,
             clauses,
             saves: Vec::new(),

@@ -67,19 +67,19 @@ pub fn meant(
 ) -> Result<Vec<Arc<Test>>, Diagnostic> {
     let source = Source::new("--filter", text);
     let expression = parse(&source)?;
-    let ground = Ground { all, quoted, source };
+    let ground = ExpressionContext { all, quoted, source };
     ground.check(&expression)?;
     let holds = |test: &&Arc<Test>| ground.holds(&expression, test);
     Ok(among.iter().filter(holds).cloned().collect())
 }
 
-struct Ground<'a> {
+struct ExpressionContext<'a> {
     all: &'a [Arc<Test>],
     quoted: &'a Sources,
     source: Arc<Source>,
 }
 
-impl Ground<'_> {
+impl ExpressionContext<'_> {
     fn holds(&self, expression: &Expression, test: &Test) -> bool {
         match expression {
             Expression::Or(one, other) => self.holds(one, test) || self.holds(other, test),

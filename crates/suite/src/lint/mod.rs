@@ -5,9 +5,9 @@
 //! requirements has to make sense in at least one.
 
 mod checks;
+mod harness_topics;
 mod names;
 mod paths;
-mod pictures;
 mod scope;
 mod steps;
 mod vocabulary;
@@ -16,8 +16,8 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
+pub use harness_topics::harness_topics;
 pub use names::{Variable, variables};
-pub use pictures::harness_topics;
 pub use vocabulary::{PackVocabulary, RequirementFacts, Vocabulary};
 
 use self::paths::Topic;
@@ -492,10 +492,10 @@ impl<'a> Linter<'a> {
 
     /// A topic on which something is awaited from the device.
     fn observed_topic(&mut self, name: &str, packs: &[usize], at: &Span) -> bool {
-        if pictures::has(name) {
+        if harness_topics::has(name) {
             return true;
         }
-        let Some(publisher) = self.topic(name, packs, at, pictures::topics().collect()) else {
+        let Some(publisher) = self.topic(name, packs, at, harness_topics::topics().collect()) else {
             return false;
         };
         if let Some(role) = self.role

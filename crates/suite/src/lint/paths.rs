@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use serde_json::Value;
 
-use super::pictures;
+use super::harness_topics;
 use super::vocabulary::Vocabulary;
 use tck_base::diagnostic::{Diagnostic, Span, did_you_mean};
 use tck_base::pattern::{Pattern, PatternKind, Piece, Term, TermKind};
@@ -19,15 +19,15 @@ pub(super) struct Topic<'a> {
 
 impl Topic<'_> {
     fn shape(&self, path: &[&str]) -> Option<Rc<Shape>> {
-        if pictures::has(self.name) {
-            return pictures::shape(self.name, path).map(Rc::new);
+        if harness_topics::has(self.name) {
+            return harness_topics::shape(self.name, path).map(Rc::new);
         }
         self.vocabulary.shape(self.pack, self.name, path)
     }
 
     fn members(&self, path: &[&str]) -> Vec<String> {
-        if pictures::has(self.name) {
-            return pictures::members(self.name, path);
+        if harness_topics::has(self.name) {
+            return harness_topics::members(self.name, path);
         }
         self.vocabulary.members(self.pack, self.name, path)
     }
@@ -52,7 +52,7 @@ impl Topic<'_> {
     /// What is wrong with a pattern for whole messages.
     pub(super) fn check(&self, pattern: &Pattern) -> Vec<Diagnostic> {
         let mut found = Vec::new();
-        self.pattern(pattern, &mut Place::default(), &mut found);
+        self.pattern(pattern, &mut PatternPosition::default(), &mut found);
         found
     }
 
@@ -92,7 +92,7 @@ impl Topic<'_> {
         })
     }
 
-    fn pattern<'p>(&self, pattern: &'p Pattern, place: &mut Place<'p>, found: &mut Vec<Diagnostic>) {
+    fn pattern<'p>(&self, pattern: &'p Pattern, place: &mut PatternPosition<'p>, found: &mut Vec<Diagnostic>) {
         let Some(shape) = self.shape(&place.path) else { return };
         if shape.open {
             return;
@@ -178,7 +178,7 @@ impl Topic<'_> {
         }
     }
 
-    fn term(&self, term: &Term, shape: &Shape, place: &Place<'_>, found: &mut Vec<Diagnostic>) {
+    fn term(&self, term: &Term, shape: &Shape, place: &PatternPosition<'_>, found: &mut Vec<Diagnostic>) {
         if let Some(value) = self.value(term) {
             self.value_fits(&value, &term.span, shape, &owned(place), found);
         }
@@ -300,13 +300,13 @@ impl Topic<'_> {
 
 /// A place in a message.
 #[derive(Default)]
-struct Place<'p> {
+struct PatternPosition<'p> {
     path: Vec<&'p str>,
     /// Whether an operator has gone into the elements of the list at the path.
     entered: bool,
 }
 
-fn owned(place: &Place<'_>) -> (Vec<String>, bool) {
+fn owned(place: &PatternPosition<'_>) -> (Vec<String>, bool) {
     (
         place.path.iter().map(|name| (*name).to_owned()).collect(),
         place.entered,

@@ -132,7 +132,7 @@ impl Linter<'_> {
                 "`of` names one of the mock vehicles that a master control is tested with",
                 "here the vehicle is the device under test",
             ),
-            Which::Second if super::pictures::has(topic) => (
+            Which::Second if super::harness_topics::has(topic) => (
                 "`of` goes with the topics of a vehicle",
                 "this belongs to the master control",
             ),

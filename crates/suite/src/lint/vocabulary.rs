@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use serde_json::Value;
 
-use tck_pack::{Breakage, Catalogue, Ground, Hooks, Packs, Role, Shape, Version};
+use tck_pack::{Breakage, BreakageScope, Catalogue, Hooks, Packs, Role, Shape, Version};
 use tck_view::Field;
 
 /// What the catalogue says about one requirement.
@@ -29,7 +29,7 @@ pub trait Vocabulary {
     /// The members below a path.
     fn members(&self, pack: usize, topic: &str, path: &[&str]) -> Vec<String>;
     /// Every way to break a message of a topic; `None` if there is no such topic.
-    fn breakages(&self, pack: usize, topic: &str, ground: &Ground) -> Option<Vec<Breakage>>;
+    fn breakages(&self, pack: usize, topic: &str, ground: &BreakageScope) -> Option<Vec<Breakage>>;
     /// Whether messages of a pack do not have a member.
     fn lacks(&self, pack: usize, member: Field) -> bool;
     /// A word of the vocabulary: `error.outdatedUpdate`.
@@ -101,7 +101,7 @@ impl Vocabulary for PackVocabulary<'_> {
         schema.map(|schema| schema.members(path)).unwrap_or_default()
     }
 
-    fn breakages(&self, pack: usize, topic: &str, ground: &Ground) -> Option<Vec<Breakage>> {
+    fn breakages(&self, pack: usize, topic: &str, ground: &BreakageScope) -> Option<Vec<Breakage>> {
         let schema = self.packs.all().get(pack)?.schema(topic)?;
         Some(schema.breakages(ground))
     }

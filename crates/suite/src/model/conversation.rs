@@ -2,7 +2,7 @@
 
 /// One stimulus of a conversation.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Said {
+pub struct ConversationPart {
     /// The situation in which it was said.
     pub situation: String,
     /// Its name in the grammar of conversations.
