@@ -219,7 +219,7 @@ fn has_new_wants_an_element_that_was_not_there_before_the_stimulus() {
     assert_eq!(new.examine(&another, Some(&old)).witness.as_deref(), Some("errors[1]"));
     let stale = new.examine(&old, Some(&old));
     assert_eq!(stale.score, (1, 2));
-    assert!(stale.misses[0].found.starts_with("already there before the stimulus"));
+    assert!(stale.misses[0].found.starts_with("already there before: "));
 }
 
 #[test]
