@@ -5,7 +5,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::args::Audit as Arguments;
 use super::exit::Exit;
 use super::problem::Problem;
-use super::recordings::{broken, in_time, open, show};
+use super::recordings::{broken, in_time, open, redacted, redactor, show};
 use tck_audit::export::Export;
 use tck_audit::pool::{self, WorkerPool};
 use tck_audit::result::{Recording, VehicleResult};
@@ -127,31 +127,6 @@ fn read(
         .into_iter()
         .map(|(number, counted)| Recording::new(names[number].clone(), units[number], counted).hashed());
     Ok(counted.collect())
-}
-
-/// What leaves out names and places, where that is asked for.
-pub(super) fn redactor(
-    arguments: &Arguments,
-    library: &Library,
-    options: &Options,
-) -> Result<Option<Redactor>, Problem> {
-    let redactor = arguments.redact.then(|| Redactor::new(&library.rules, options));
-    Ok(redactor.transpose()?)
-}
-
-/// What is left of what is told: of a connection nothing, where names are left out.
-pub(super) fn redacted(told: Told, redactor: &mut Option<Redactor>) -> Option<Told> {
-    match (told, redactor) {
-        (told, None) => Some(told),
-        (Told::Message(message), Some(redactor)) => {
-            let message = redactor.message(Message {
-                carried: None,
-                ..message
-            });
-            Some(Told::Message(message))
-        }
-        (Told::Wire(_), Some(_)) => None,
-    }
 }
 
 /// How far the reader is, for a person who waits.

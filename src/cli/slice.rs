@@ -3,10 +3,9 @@
 use std::collections::VecDeque;
 
 use super::args::Audit as Arguments;
-use super::audit::{redacted, redactor};
 use super::exit::Exit;
 use super::problem::Problem;
-use super::recordings::{broken, in_time, open};
+use super::recordings::{broken, in_time, open, redacted, redactor};
 use tck_audit::result::AuditResult;
 use tck_audit::slice::{Target, origin, records, smallest, written};
 use tck_audit::{Audit, Options};

@@ -178,7 +178,7 @@ fn what_does_not_fit_into_the_budget_is_left_out_by_name_and_gone_on_with() {
     let whole = bench.result();
     let all = verdicts(&whole).len();
     fs::remove_dir_all(bench.path().join("reports")).unwrap();
-    plain(&[QUICK, drives, "--budget", "20s"])
+    plain(&[QUICK, drives, "--budget", "6s"])
         .code(3)
         .prints("give the run more time (--budget), or go on with what is left (--resume)");
     let result = bench.result();
@@ -192,8 +192,8 @@ fn what_does_not_fit_into_the_budget_is_left_out_by_name_and_gone_on_with() {
     assert!(!left.is_empty() && left.len() < all, "{} of {all}", left.len());
     for test in &left {
         assert_eq!(test["verdict"], "inconclusive");
-        assert_eq!(test["reason"], "not carried out: budget (--budget 20s)");
-        assert_eq!(test["cause"]["budget"], 20);
+        assert_eq!(test["reason"], "not carried out: budget (--budget 6s)");
+        assert_eq!(test["cause"]["budget"], 6);
     }
     let limits = result["limits"].to_string();
     assert!(
@@ -232,7 +232,7 @@ fn a_repetition_that_has_no_time_is_undecided() {
 #[test]
 fn a_certification_without_time_is_no_paper_and_goes_on_as_a_certification_only() {
     let bench = Bench::new();
-    certified_within(&bench.path().join("run"), Some(Duration::from_secs(60)));
+    certified_within(&bench.path().join("run"), Some(Duration::from_secs(6)));
     let result = fs::read_to_string(bench.path().join("run/result.json")).unwrap();
     let result: Value = serde_json::from_str(&result).unwrap();
     let decided = verdicts(&result)

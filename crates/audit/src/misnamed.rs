@@ -21,7 +21,7 @@ const REQUIREMENT: &str = "TOPIC-01";
 /// How many of them are remembered.
 const MOST: usize = 1024;
 
-/// See the module.
+/// Messages on topics of nearly known names, by topic.
 #[derive(Debug, Default)]
 pub(super) struct Misnamed(BTreeMap<String, Seen>);
 

@@ -11,7 +11,7 @@ use tck_suite::model::Test;
 /// So many places are tried at most.
 const PLACES: usize = 40;
 
-/// See the module.
+/// Floor of a plan, with what is wanted of it and not there.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Floor {
@@ -38,9 +38,9 @@ pub struct Floor {
 pub struct Wanting {
     /// Their ids.
     pub tests: Vec<String>,
-    /// From so many places they can be carried out …
+    /// How many of the places that were tried allow them.
     pub from: usize,
-    /// … of so many that were tried.
+    /// How many places were tried.
     pub of: usize,
     /// Why not from another one.
     pub why: String,

@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 use super::driver::RunningDevice;
 use super::fleet::Fleet;
 use tck_base::clock::WallClock;
-use tck_engine::{HookOutcome, Operator};
+use tck_engine::{Asks, HookOutcome, Operator};
 use tck_net::bench::endpoint::Endpoint;
 use tck_net::link::mqtt::Reporter;
 use tck_reference::deviations::personas::mock;
@@ -65,6 +65,10 @@ impl<O: Operator> Operator for WithFleet<O> {
 
     async fn run(&mut self, hook: &str, parameters: Map<String, Value>) -> HookOutcome {
         self.operator.run(hook, parameters).await
+    }
+
+    fn asks(&self, hook: &str, parameters: &Map<String, Value>) -> Option<Asks> {
+        self.operator.asks(hook, parameters)
     }
 
     fn natural_traffic(&self, hook: &str) -> Option<Duration> {
