@@ -9,7 +9,7 @@ use super::recordings::{broken, in_time, open, redacted, redactor, show};
 use tck_audit::export::Export;
 use tck_audit::pool::{self, WorkerPool};
 use tck_audit::result::{Recording, VehicleResult};
-use tck_audit::{AuditError, Options, Redactor, bundle, own_run};
+use tck_audit::{AuditError, Options, bundle, own_run};
 use tck_base::diagnostic::Diagnostic;
 use tck_capture::merge::Merged;
 use tck_capture::{CaptureError, Item, Message, Told};

@@ -67,7 +67,8 @@ fn without_journal_and_catalogue_the_block_still_says_what_is_known() {
     let (result, _) = samples::fail();
     let text = whole(&result, &Sources::default(), None, Color::Never);
     assert!(
-        text.contains("closest  #") && text.contains("errors[0].errorType is \"orderError\", expected \"orderUpdateError\""),
+        text.contains("closest  #")
+            && text.contains("errors[0].errorType is \"orderError\", expected \"orderUpdateError\""),
         "{text}"
     );
 }
