@@ -51,7 +51,7 @@ struct Persist {
 }
 
 /// The requirement that demands of an error type to stay.
-fn requirement(error_type: &str) -> Option<(&'static str, &'static str)> {
+pub(super) fn requirement(error_type: &str) -> Option<(&'static str, &'static str)> {
     // One check for all versions: later ones spell these in capitals.
     match error_type {
         "validationError" | "VALIDATION_FAILURE" => Some(("validation", "ORD-REJ-03")),
@@ -254,7 +254,10 @@ mod tests {
     #[test]
     fn a_restart_or_a_change_of_mode_ends_the_watch() {
         let mut trace = rejected("validationError");
-        trace.connection("ONLINE").state(&json!({}));
+        trace
+            .connection("CONNECTIONBROKEN")
+            .connection("ONLINE")
+            .state(&json!({}));
         assert!(trace.judge(CHECK).findings.is_empty());
         let mut trace = rejected("validationError");
         trace.hook().state(&json!({}));

@@ -5,24 +5,25 @@ use serde_json::Value;
 use crate::finding::{broken, show};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_view::{FactsheetView, VehicleConfig};
-use tck_world::{Listen, Observation, Topic};
+use tck_world::{Fact, Listen, Observation, Topic};
 
 /// The network data of a vehicle in operation stay what they are.
 pub(super) const NETWORK: Check = Check {
     name: "factsheet/network",
     decides: &["FACT-10"],
-    doc: "vehicleConfig.network says the same in every factsheet of one connection. Without a tap a connection lasts from one \
-          connection message to the next.",
+    doc: "vehicleConfig.network says the same in every factsheet of one connection. Without a tap a connection lasts until \
+          OFFLINE or CONNECTIONBROKEN.",
     arguments: &[],
     listens: &[
         Listen::Connect,
         Listen::Delivered(Topic::Connection),
         Listen::Hook,
         Listen::Answer,
+        Listen::Delivered(Topic::State),
         Listen::Delivered(Topic::Factsheet),
         Listen::Published(Topic::Factsheet),
     ],
-    reads: &[],
+    reads: &[Fact::Restarts],
     needs: &[VehicleConfig::network],
     start: |_| Box::new(Network::default()),
 };
@@ -33,9 +34,13 @@ struct Network {
 }
 
 impl Running for Network {
-    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let anew = record.connects() || !record.link.tap && record.may_be_a_restart();
-        if anew || record.outside_influence() {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        if context.world.restarts().connects(record) || record.outside_influence() {
             self.said = None;
         }
         let message = record.published();
@@ -68,8 +73,9 @@ mod tests {
             let mut trace = Trace::subscriber();
             trace.message("factsheet", &sheet(1));
             if anew {
-                trace.connection("ONLINE");
+                trace.connection("CONNECTIONBROKEN");
             }
+            trace.connection("ONLINE");
             trace.message("factsheet", &sheet(last));
             trace.judge("factsheet/network").summary()
         };

@@ -29,7 +29,7 @@ pub(super) const TIMESTAMP: Check = Check {
     name: "header/timestamp",
     decides: &["HDR-03"],
     doc: "timestamp is a point in time in UTC, written with T and Z. Another number of fraction digits than two is a \
-          warning, as is a clock more than five minutes away from the harness's; the will is not held to the clock. \
+          warning, once, as is a clock more than five minutes away from the harness's; the will is not held to the clock. \
           Message after message at whole half hours from the clock of the harness is local time, and a time that does \
           not change from message to message of a topic is none.",
     arguments: &[],
@@ -75,6 +75,8 @@ struct Timestamp {
     written: BTreeMap<String, Stood>,
     /// How many messages in a row were whole half hours off.
     local: u32,
+    /// The number of fraction digits was remarked on.
+    digits: bool,
 }
 
 /// A time that is written again and again.
@@ -140,8 +142,12 @@ impl Running for Timestamp {
             return true;
         };
         let digits = form.get(1).map_or(0, |digits| digits.len());
-        if digits != 2 {
-            let text = format!("timestamp {} has {digits} fraction digits instead of 2", quote(written));
+        if digits != 2 && !std::mem::replace(&mut self.digits, true) {
+            let text = format!(
+                "timestamp {} has {digits} fraction digits: write two, as in {:.2}",
+                quote(written),
+                record.at().utc
+            );
             findings.push(remark("HDR-03", record.seq(), text));
         }
         let apart = time.duration_since(record.at().utc).unsigned_abs();

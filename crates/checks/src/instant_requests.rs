@@ -209,6 +209,7 @@ mod tests {
         let mut trace = asks("factsheetRequest");
         trace
             .state(&ended("FINISHED"))
+            .connection("CONNECTIONBROKEN")
             .connection("ONLINE")
             .wait(60.0)
             .state(&json!({}));

@@ -18,6 +18,7 @@ mod connection_offline;
 mod errors;
 mod errors_blame;
 mod errors_event;
+mod errors_lingering;
 mod errors_ready;
 mod factsheet;
 mod factsheet_actions;
@@ -114,10 +115,12 @@ pub static REGISTRY: &[Check] = &[
     trajectory::PLANNED_PATH,
     state::battery::LEVELS,
     state::loads::LOADS,
+    state::joint_loads::JOINT_LOADS,
     visualization::RATE,
     visualization::PUBLISHED,
     visualization_pose::POSITION,
     errors::PERSIST,
+    errors_lingering::GONE,
     errors_ready::READY,
     errors_event::ON_EVENT,
     errors_blame::BLAME,

@@ -130,6 +130,10 @@ impl Linked {
             }
             self.placed.insert(action.action_id.or_empty().to_owned());
         }
+        // A cancelOrder in an order is none: whoever took such an order over did not cancel by it.
+        let placed = placed
+            .into_iter()
+            .filter(|action| topic(action.action_type.or_empty()) != Some(HookChange::Order));
         for action in instant.chain(placed).take(ACTIONS) {
             let kind = action.action_type.or_empty();
             let id = action.action_id.or_empty().to_owned();
@@ -386,6 +390,19 @@ mod tests {
             |version: &str| json!({ "maps": [{ "mapId": "hall", "mapVersion": version, "mapStatus": "ENABLED" }] });
         assert!(judge("enableMap", &asked, &version("2")).is_empty());
         assert_eq!(judge("enableMap", &asked, &version("1")), ["MAP-24"]);
+    }
+
+    #[test]
+    fn a_cancel_that_stands_in_an_order_cancels_nothing() {
+        let mut trace = Trace::subscriber();
+        let actions = json!([{ "actionId": "x", "actionType": "cancelOrder" }]);
+        let node = json!({ "nodeId": "a", "sequenceId": 0, "released": true, "actions": actions });
+        trace.sent("order", &json!({ "orderId": "o", "nodes": [node], "edges": [] }));
+        trace.state(&json!({ "orderId": "o" }));
+        let ended = json!([{ "actionId": "x", "actionStatus": "FINISHED" }]);
+        let left = json!([{ "nodeId": "b", "sequenceId": 2, "released": true }]);
+        trace.state(&json!({ "orderId": "o", "actionStates": ended, "nodeStates": left }));
+        assert!(trace.judge("action/linked-state").findings.is_empty());
     }
 
     #[test]

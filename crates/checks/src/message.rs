@@ -63,7 +63,8 @@ pub(super) const SCHEMA: Check = Check {
     doc: "Every message obeys the schema of its topic, written from the field tables of the document. A finding counts \
           for JSON-10, for the rule on JSON types or literals it breaks, and for the requirement of the field. A \
           charge outside 0 to 100 is a warning. What single precision makes of pi is a warning, once. What a state \
-          repeats of a malformed order of the harness is not judged: that it was taken over is the mistake.",
+          repeats of a malformed message of the harness, or still lists of it under a later order, is not judged: that it was \
+          taken over is the mistake.",
     arguments: &[],
     listens: &[Listen::AnyDelivered],
     reads: &[Fact::Malformed],
@@ -291,7 +292,8 @@ impl Running for Schema {
         let of_order = topic == "state" && context.world.malformed().is_shown(record);
         for finding in schema.findings(value) {
             let first = finding.path.split('/').nth(1).unwrap_or_default();
-            if of_order && self.of_order.iter().any(|name| name == first) {
+            let repeats = topic == "state" && self.of_order.iter().any(|name| name == first);
+            if repeats && (of_order || context.world.malformed().is_echo(value, &finding.path)) {
                 continue;
             }
             if is_rounded_pi(&finding, value) {
@@ -464,6 +466,34 @@ mod tests {
         let mut trace = Trace::subscriber();
         trace.state(over);
         trace.judge("message/schema").summary()
+    }
+
+    #[test]
+    fn what_is_left_of_a_malformed_message_is_not_judged_under_a_later_order() {
+        let shown = |kind: &Value, sequence: i64| {
+            let mut trace = Trace::subscriber();
+            let header = trace.header();
+            let action = json!({ "actionId": "x", "actionType": 7, "blockingType": "HARD", "actionParameters": [] });
+            let mut instant = header.clone();
+            instant["actions"] = json!([action]);
+            trace.sent("instantActions", &instant);
+            let node =
+                |sequence: i64| json!({ "nodeId": "a", "sequenceId": sequence, "released": true, "actions": [] });
+            for (id, sequence) in [("bad", -1), ("good", 0)] {
+                let mut order = header.clone();
+                order["orderId"] = json!(id);
+                order["orderUpdateId"] = json!(0);
+                order["nodes"] = json!([node(sequence)]);
+                order["edges"] = json!([]);
+                trace.sent("order", &order);
+            }
+            let action = json!({ "actionId": "y", "actionType": kind, "actionStatus": "FINISHED" });
+            trace.state(&json!({ "orderId": "good", "lastNodeSequenceId": sequence, "actionStates": [action] }));
+            trace.judge("message/schema").summary()
+        };
+        assert_eq!(shown(&json!(7), -1), Vec::<String>::new());
+        assert!(!shown(&json!(8), 0).is_empty(), "that was never sent");
+        assert!(!shown(&json!("pick"), -2).is_empty(), "nor was that");
     }
 
     #[test]

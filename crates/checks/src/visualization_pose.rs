@@ -35,6 +35,7 @@ pub(super) const POSITION: Check = Check {
         Listen::ToVehicle(Topic::InstantActions),
         Listen::ToVehicle(Topic::Order),
         Listen::Connect,
+        Listen::Delivered(Topic::Connection),
         Listen::Hook,
         Listen::Answer,
         Listen::Fault,

@@ -84,7 +84,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
                 operator.hook
             )),
             HookOutcome::Failed(why) => StepEnd::Broken(format!("hook `{}` failed: {why}", operator.hook)),
-            HookOutcome::Refused(why) => StepEnd::Refused(format!(
+            HookOutcome::Refused(why) => StepEnd::Declined(format!(
                 "the device refuses what hook `{}` asks for: {why}",
                 operator.hook
             )),

@@ -45,6 +45,8 @@ pub enum StepEnd {
     Broken(String),
     /// The device does not do what a hook asks of it, or cannot be asked any more; the text says why.
     Refused(String),
+    /// The device says in answer to a hook that it does not do what it is asked for; the text says so.
+    Declined(String),
     /// The operator leaves the test out; the text says so.
     Skipped(String),
 }

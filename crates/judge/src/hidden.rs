@@ -5,9 +5,12 @@
 //! was told could not be observed. A monitor names the members it speaks for under `hides:`, and what was missed there
 //! is inconclusive in the tests it found something in. Which monitors do so is data.
 
+use tck_journal::Entry;
 use tck_result::{Sent, Waited};
+use tck_view::Topic;
 
 use super::step::{Clause, ClauseOutcome, Timing};
+use super::timeline::Timeline;
 
 /// A clause of a step that has ended, not decided yet.
 pub(super) struct Open {
@@ -27,6 +30,32 @@ pub(super) struct Open {
     pub refused: bool,
     /// What it says about time, if it is a finding about time.
     pub of_time: Option<Timing>,
+    /// The order that the vehicle still had when the last one was sent to it.
+    pub busy: Option<OrderUnderWay>,
+}
+
+/// An order of which nodes were left when another one was sent.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct OrderUnderWay {
+    /// Its orderId.
+    pub order: String,
+    /// The state that shows it.
+    pub seq: u64,
+}
+
+impl OrderUnderWay {
+    /// The order that a vehicle shows in the last state before another one is sent to it in this message.
+    pub fn before(timeline: &Timeline, sent: &Entry) -> Option<Self> {
+        let next = timeline.view(sent, Topic::Order)?.order()?;
+        let shown = timeline.before("state", sent.seq())?;
+        let state = timeline.state(shown)?;
+        let (next, order) = (next.order_id.text()?, state.order_id.text()?);
+        let is_other = !order.is_empty() && !next.is_empty() && order != next;
+        (is_other && state.node_states.total() > 0).then(|| Self {
+            order: order.to_owned(),
+            seq: shown.seq(),
+        })
+    }
 }
 
 /// A member of a message that shows nothing in a test.
@@ -68,6 +97,26 @@ impl Hidden {
             && !self.decides.iter().any(|id| about.contains(id))
             && self.seq <= open.ended
             && !(open.refused && open.clause.holds == ClauseOutcome::Violated && open.clause.witness.is_none())
+    }
+}
+
+/// Marks as unseen what was awaited of a new order of a vehicle that still had another one: it has to refuse the new one. That
+/// it still had the other one is decided where that was to end.
+pub(super) fn excuse_busy(all: &mut [Open]) {
+    for open in all {
+        let Some(busy) = &open.busy else { continue };
+        let nearest = open.clause.nearest.as_ref();
+        let keeps =
+            nearest.is_some_and(|nearest| nearest.path == "orderId" && nearest.found.trim_matches('"') == busy.order);
+        if open.clause.holds != ClauseOutcome::Violated || open.clause.witness.is_some() || !keeps {
+            continue;
+        }
+        let why = format!(
+            "the vehicle still had order {:?} when the new one was sent (#{}), and has to refuse it",
+            busy.order, busy.seq
+        );
+        open.clause.message = format!("cannot be told, since {why}; {}", open.clause.message);
+        open.clause.holds = ClauseOutcome::Unobservable(why);
     }
 }
 
@@ -136,6 +185,7 @@ mod tests {
             sent: None,
             of_time: None,
             refused: false,
+            busy: None,
         }
     }
 
@@ -170,6 +220,33 @@ mod tests {
         let mut came = clause("ORD-06", "orderId");
         came.clause.witness = Some(20);
         assert!(!is_hidden(came, 15));
+    }
+
+    #[test]
+    fn a_new_order_of_a_vehicle_that_still_has_one_shows_nothing() {
+        let unseen = |busy: bool, path: &str, found: &str| {
+            let mut open = clause("ORD-CANCEL-13", path);
+            if let Some(nearest) = &mut open.clause.nearest {
+                nearest.found = found.to_owned();
+            }
+            open.busy = busy.then(|| OrderUnderWay {
+                order: "before".to_owned(),
+                seq: 12,
+            });
+            let mut all = [open];
+            excuse_busy(&mut all);
+            matches!(all[0].clause.holds, ClauseOutcome::Unobservable(_))
+        };
+        assert!(unseen(true, "orderId", "\"before\""));
+        assert!(!unseen(false, "orderId", "\"before\""));
+        assert!(
+            !unseen(true, "orderId", "\"after\""),
+            "it took the new one over all the same"
+        );
+        assert!(
+            !unseen(true, "errors", "[]"),
+            "what is awaited of the refusal is judged"
+        );
     }
 
     #[test]

@@ -12,7 +12,7 @@ use super::decide::decide;
 use super::disconnect::Disconnect;
 use super::eval_context::EvalContext;
 use super::gone::Gone;
-use super::hidden::{Hidden, Open, hide};
+use super::hidden::{Hidden, Open, OrderUnderWay, excuse_busy, hide};
 use super::own_errors::{is_refused, reported};
 use super::run_contexts::Ground;
 use super::sent::sent;
@@ -55,6 +55,10 @@ pub struct TestJudge {
     open: Vec<Open>,
     /// What was sent last.
     sent: Option<Sent>,
+    /// The order that the vehicle still had when the last order was sent to it.
+    busy: Option<OrderUnderWay>,
+    /// A master control has declined what a hook asked of it. What it must not send can still be judged.
+    declined: Option<String>,
     ended: bool,
 }
 
@@ -110,6 +114,8 @@ impl TestJudge {
             hidden: Vec::new(),
             open: Vec::new(),
             sent: None,
+            busy: None,
+            declined: None,
             ended: false,
         }
     }
@@ -247,10 +253,18 @@ impl TestJudge {
         else {
             return;
         };
+        let is_answer = ground.role == Role::MasterControl
+            && section == Section::Steps
+            && self
+                .next_waiting(&step)
+                .is_some_and(|next| matches!(next.verb, Verb::Never(_)));
         let cut_short = match end {
             StepEnd::Decided | StepEnd::Deadline => None,
+            StepEnd::Declined(_) if is_answer => None,
             StepEnd::Interrupted => Some("the run was interrupted".to_owned()),
-            StepEnd::Broken(why) | StepEnd::Refused(why) | StepEnd::Skipped(why) => Some(why.clone()),
+            StepEnd::Broken(why) | StepEnd::Refused(why) | StepEnd::Declined(why) | StepEnd::Skipped(why) => {
+                Some(why.clone())
+            }
         };
         let at = entry.at().moment;
         let outcome = evaluator.end(at, cut_short.as_deref(), &self.scene(timeline, ground));
@@ -262,12 +276,30 @@ impl TestJudge {
         }
         match end {
             StepEnd::Broken(why) => self.broken(section, &step, why),
-            StepEnd::Refused(why) | StepEnd::Skipped(why) => self.refused(section, &step, why),
+            StepEnd::Declined(why) if is_answer => self.declined = Some(why.clone()),
+            StepEnd::Refused(why) | StepEnd::Declined(why) | StepEnd::Skipped(why) => {
+                self.refused(section, &step, why);
+            }
             _ => {}
+        }
+        // What is awaited beyond what must not come does not come of something that was declined.
+        if let Some(why) = self.declined.clone()
+            && self
+                .next_waiting(&step)
+                .is_some_and(|next| !matches!(next.verb, Verb::Never(_)))
+            && !is_answer
+        {
+            self.refused(section, &step, &why);
         }
         if let Verb::Send(send) = &step.verb {
             let since = self.entries.partition_point(|entry| entry.seq() < begun.0);
             self.sent = sent(send, self.entries[since..].iter(), &self.bindings);
+            let order = self.entries[since..].iter().find(|entry| {
+                ground.role == Role::Agv && send.topic == "order" && matches!(entry.event(), Event::Sent { .. })
+            });
+            if let Some(order) = order {
+                self.busy = OrderUnderWay::before(timeline, order);
+            }
         }
         for (name, value) in &outcome.saves {
             self.bindings.set(name, value.clone());
@@ -334,6 +366,7 @@ impl TestJudge {
                     sent: self.sent.clone(),
                     of_time,
                     refused: ground.role == Role::Agv && is_refused(timeline, self.mark),
+                    busy: self.busy.clone(),
                 });
             }
         }
@@ -353,6 +386,24 @@ impl TestJudge {
         }
     }
 
+    /// The next step of the test that waits for messages, behind this one.
+    fn next_waiting(&self, step: &Step) -> Option<&Step> {
+        let behind = self
+            .test
+            .steps
+            .iter()
+            .skip_while(|other| other.path != step.path)
+            .skip(1);
+        let mut waiting = behind.filter(|step| {
+            let verb = &step.verb;
+            matches!(
+                verb,
+                Verb::Never(_) | Verb::Expect(_) | Verb::Always(_) | Verb::Action(_) | Verb::Retained(_)
+            )
+        });
+        waiting.next()
+    }
+
     fn broken(&mut self, section: Section, step: &Step, why: &str) {
         if section != Section::Finally {
             self.trouble.get_or_insert_with(|| format!("{}: {why}", step.path));
@@ -364,7 +415,7 @@ impl TestJudge {
             (StepEnd::Broken(_), _) => "broken",
             (StepEnd::Interrupted, _) => "interrupted",
             (StepEnd::Skipped(_), _) => "skipped",
-            (StepEnd::Refused(_), _) | (_, Some(Err(_))) => "failed",
+            (StepEnd::Refused(_) | StepEnd::Declined(_), _) | (_, Some(Err(_))) => "failed",
             _ => StepResult::DONE,
         };
         self.result.steps.push(StepResult {
@@ -446,6 +497,7 @@ impl TestJudge {
         self.result.seconds = at.since(self.begun.1).as_secs_f64();
         let mut open = std::mem::take(&mut self.open);
         let hidden = hide(&mut open, &self.hidden);
+        excuse_busy(&mut open);
         for open in open {
             let decision = decide(open, &ground.catalogue, &ground.pack);
             self.push(decision);

@@ -205,6 +205,11 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         self.order(nodes, json!([])).await?;
         self.shows_own_order().await?;
         self.rests_within(self.time("settle")).await?;
+        // Where lists are read over, nothing shows that the vehicle is done with clearing them.
+        if !self.engine.recorder.judge().ground().waivers.is_empty() {
+            let settled = self.engine.link.now().moment + self.time("settle");
+            self.engine.watch(settled, |_| false).await?;
+        }
         Ok(())
     }
 

@@ -221,7 +221,11 @@ impl RequestBuilder {
         Ok(Request {
             tests,
             draw,
-            run: self.seed.map_or_else(|| of_eight(random), |seed| format!("seed{seed}")),
+            // The ids of a run that goes on are not those it has begun with.
+            run: match self.seed.filter(|_| !goes_on) {
+                Some(seed) => format!("seed{seed}"),
+                None => of_eight(random),
+            },
             command: self.command,
             fail_fast: self.fail_fast,
             repeat: self.repeat.max(1),
@@ -251,6 +255,8 @@ mod tests {
         let seeded = built(RequestBuilder::new().seed(7)).unwrap();
         assert_eq!((seeded.draw, seeded.run.as_str()), (Some(7), "seed7"));
         assert!(seeded.tests.is_complete());
+        let resumed = built(RequestBuilder::new().seed(7).left(seeded.tests.clone())).unwrap();
+        assert_ne!(resumed.run, "seed7", "its ids were sent before");
         let thorough = built(RequestBuilder::new().seed(7).thorough()).unwrap();
         assert_eq!(thorough.draw, None);
         let single = built(RequestBuilder::new().select("*[*")).unwrap();

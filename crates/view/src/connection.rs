@@ -23,6 +23,12 @@ impl ConnectionView {
         self.connection_state.is("OFFLINE")
     }
 
+    /// Whether it says that the vehicle is not connected any more.
+    #[must_use]
+    pub fn is_gone(&self) -> bool {
+        self.is_offline() || self.is_broken()
+    }
+
     /// Whether it says that the connection is broken; with or without underscore, depending on the version.
     #[must_use]
     pub fn is_broken(&self) -> bool {

@@ -4,6 +4,7 @@ use tck_base::clock::Moment;
 
 use crate::observation::Observation;
 use crate::orders::sets_position;
+use crate::restarts::Restarts;
 use tck_view::ActionView;
 
 /// How many actions of an order are looked at.
@@ -43,8 +44,8 @@ fn places(record: &Observation<'_>) -> bool {
 
 impl Displaced {
     /// Learns from the next record.
-    pub(crate) fn learn(&mut self, record: &Observation<'_>) {
-        if record.connects() || record.outside_influence() || places(record) {
+    pub(crate) fn learn(&mut self, record: &Observation<'_>, restarts: &Restarts) {
+        if restarts.connects(record) || record.outside_influence() || places(record) {
             self.last = Some((record.at().moment, record.seq()));
         }
     }

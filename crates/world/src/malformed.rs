@@ -1,16 +1,22 @@
 //! The malformed orders of the harness, which no vehicle should take over.
 //!
-//! A vehicle that does so breaks the refusal alone: what its states show from then on is what we told it.
+//! A vehicle that does so breaks the refusal alone: what its states show from then on is what we told it, and what they keep of
+//! it under a later order is so, too. Instant actions that break the schema are given back in the same way.
 
 use std::collections::VecDeque;
+
+use serde_json::Value;
 
 use crate::observation::Observation;
 use crate::orders::OrdersSent;
 use crate::setting::Setting;
-use tck_view::{StateView, Topic};
+use tck_pack::Finding;
+use tck_view::{ActionView, StateView, Topic};
 
 /// How many orders of either kind are kept.
 const MESSAGES: usize = 64;
+/// How many actions and values of malformed messages are kept.
+const PARTS: usize = 512;
 
 /// Which orders were malformed, and whether a state shows one of them.
 #[derive(Debug, Default)]
@@ -22,6 +28,10 @@ pub struct MalformedOrders {
     /// No good order has been shown since one that does not even have a name: in any state, and in those of a vehicle that
     /// master control is in command of.
     nameless: [bool; 2],
+    /// actionIds of malformed messages.
+    actions: VecDeque<String>,
+    /// Values that broke the schema in them.
+    values: VecDeque<Value>,
     /// The last order, and whether it is malformed.
     order: Option<(u64, bool)>,
     /// The last state, and whether it shows a malformed order: as any state, and as one in which master control is in command.
@@ -47,13 +57,56 @@ impl MalformedOrders {
         self.state.is_some_and(|(seq, shown)| seq == record.seq() && shown[1])
     }
 
+    /// Whether what a state says at this place is what a malformed message said: a value that breaks the schema, or what belongs
+    /// to an action of such a message.
+    #[must_use]
+    pub fn is_echo(&self, state: &Value, path: &str) -> bool {
+        let said = state.pointer(path).filter(|said| !said.is_null());
+        if said.is_some_and(|said| self.values.contains(said)) {
+            return true;
+        }
+        let mut levels = path.split('/').skip(1);
+        let element = levels.next().zip(levels.next());
+        let element = element.and_then(|(list, at)| state.get(list)?.get(at.parse::<usize>().ok()?));
+        let action = element.and_then(|element| element.get(ActionView::action_id.usual_name())?.as_str());
+        action.is_some_and(|action| self.actions.iter().any(|known| known == action))
+    }
+
+    /// Keeps in mind what a malformed message says.
+    fn note_parts<'m>(
+        &mut self,
+        document: &Value,
+        findings: &[Finding],
+        actions: impl Iterator<Item = &'m ActionView>,
+    ) {
+        let ids = actions.filter_map(|action| action.action_id.text());
+        self.actions.extend(ids.take(PARTS).map(str::to_owned));
+        self.actions.drain(..self.actions.len().saturating_sub(PARTS));
+        let broken = findings.iter().filter_map(|finding| document.pointer(&finding.path));
+        let small = |value: &&Value| matches!(value, Value::String(_) | Value::Number(_) | Value::Bool(_));
+        self.values.extend(broken.filter(small).take(PARTS).cloned());
+        self.values.drain(..self.values.len().saturating_sub(PARTS));
+    }
+
+    fn note_instant(&mut self, record: &Observation<'_>, setting: &Setting<'_>) {
+        let (Some(document), Some(message)) = (record.json(), record.instant_actions_to_vehicle()) else {
+            return;
+        };
+        let schema = setting.pack.schema(Topic::InstantActions.as_str());
+        let findings = schema.map(|schema| schema.findings(document)).unwrap_or_default();
+        if !findings.is_empty() {
+            self.note_parts(document, &findings, message.all_actions());
+        }
+    }
+
     fn note_order(&mut self, record: &Observation<'_>, setting: &Setting<'_>, orders: &OrdersSent) {
         let (Some(document), Some(message)) = (record.json(), record.order_to_vehicle()) else {
             self.order = Some((record.seq(), true));
             return;
         };
-        let schema = setting.pack.schema("order");
-        let obeys = schema.is_none_or(|schema| schema.findings(document).is_empty());
+        let schema = setting.pack.schema(Topic::Order.as_str());
+        let broken = schema.map(|schema| schema.findings(document)).unwrap_or_default();
+        let obeys = broken.is_empty();
         let good = orders
             .now(record)
             .filter(|sent| obeys && sent.sound && !sent.order.is_empty());
@@ -65,6 +118,7 @@ impl MalformedOrders {
                 self.good.drain(..excess);
             }
             None => {
+                self.note_parts(document, &broken, message.actions().map(|(_, action)| action));
                 let name = message.order_id.or_empty().to_owned();
                 if name.is_empty() {
                     self.nameless = [true; 2];
@@ -98,6 +152,9 @@ impl MalformedOrders {
     pub(crate) fn learn(&mut self, record: &Observation<'_>, setting: &Setting<'_>, orders: &OrdersSent) {
         if record.is_to_vehicle(Topic::Order) {
             self.note_order(record, setting, orders);
+        }
+        if record.is_to_vehicle(Topic::InstantActions) {
+            self.note_instant(record, setting);
         }
         if let Some(state) = record.state() {
             let is_named = state.order_id.is_there() && state.order_update_id.whole().is_some();

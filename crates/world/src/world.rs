@@ -46,6 +46,7 @@ impl Fact {
     /// The facts that are learned from this one.
     const fn rests_on(self) -> &'static [Self] {
         match self {
+            Self::Displaced => &[Self::Restarts],
             Self::Malformed => &[Self::Orders],
             Self::Way => &[Self::Orders, Self::Shown],
             Self::Starts => &[Self::Mock],
@@ -115,7 +116,7 @@ impl World {
             self.restarts.learn(record);
         }
         if learns(Fact::Displaced) {
-            self.displaced.learn(record);
+            self.displaced.learn(record, &self.restarts);
         }
         if learns(Fact::Orders) {
             self.orders.learn(record);

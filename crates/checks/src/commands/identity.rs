@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::graph::is_counted;
 use super::{Command, ELEMENTS, Found, elements, nodes_in_sequence, place_of, short};
 use crate::finding::{quote, unclear};
+use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::Event;
 use tck_pack::HookInfo;
@@ -29,16 +30,20 @@ pub(crate) const ACTION_IDS: Check = Check {
     name: "commands/action-ids",
     decides: &["ORD-MSG-17"],
     doc: "An actionId stands for one action, in orders and instant actions together. It may come again where the same \
-          action stands in the same place: in a stitching node, or in a message that is sent again. Ids are forgotten \
-          when the master control is started anew.",
+          action stands in the same place: in a stitching node, or in a message that is sent again. An instant action is sent \
+          again as long as no state has shown its end for longer than time.notice; after that its id stands for a second \
+          action. Ids are forgotten when the master control is started anew.",
     arguments: &[],
     listens: &[
         Listen::Hook,
         Listen::Answer,
+        Listen::Fault,
+        Listen::Vehicle,
+        Listen::Sent(Topic::State),
         Listen::Delivered(Topic::Order),
         Listen::Delivered(Topic::InstantActions),
     ],
-    reads: &[],
+    reads: &[Fact::Mock],
     needs: &[ActionView::action_id],
     start: |_| Box::new(ActionIds::default()),
 };
@@ -111,6 +116,30 @@ impl Running for NodeIds {
 struct ActionIds {
     /// Where each action stands, and what it is.
     known: BTreeMap<String, (String, Option<Print>)>,
+    /// When a state first showed the end of an action.
+    ended: BTreeMap<String, Moment>,
+}
+
+impl ActionIds {
+    /// Learns from a state which of the actions that were sent have ended.
+    fn learn(&mut self, record: &Observation<'_>) {
+        let Some(state) = record.said_state() else { return };
+        for action in state
+            .action_states
+            .iter()
+            .take(ELEMENTS)
+            .filter(|action| action.is_over())
+        {
+            if let Some(id) = short(&action.action_id).filter(|id| self.known.contains_key(id)) {
+                self.ended.entry(id).or_insert(record.at().moment);
+            }
+        }
+    }
+
+    fn forget(&mut self) {
+        self.known.clear();
+        self.ended.clear();
+    }
 }
 
 /// Every action of a message with a name for the place where it stands.
@@ -141,13 +170,19 @@ impl Running for ActionIds {
         findings: &mut Vec<CheckFinding>,
     ) -> bool {
         match record.event() {
-            Event::Hook { hook, .. } if context.hook(hook).is_some_and(HookInfo::restarts) => self.known.clear(),
-            Event::Answer { .. } => self.known.clear(),
+            Event::Hook { hook, .. } if context.hook(hook).is_some_and(HookInfo::restarts) => self.forget(),
+            Event::Answer { .. } => self.forget(),
             _ => {}
         }
+        // What its states showed may not have been heard.
+        if context.world.mock().is_lost(record) {
+            self.ended.clear();
+        }
+        self.learn(record);
         let Some(command) = Command::read(record) else {
             return false;
         };
+        let (now, notice) = (record.at().moment, context.time.notice);
         let mut found = Found::new(record, findings);
         let mut judged = false;
         let counted = command.order().is_none_or(is_counted);
@@ -177,10 +212,19 @@ impl Running for ActionIds {
                 } else if *known_print != print {
                     let text = format!("actionId {} stands for another instant action than before", quote(&id));
                     found.broken("ORD-MSG-17", text);
+                } else if print.is_some() && self.ended.get(&id).is_some_and(|ended| now.since(*ended) > notice) {
+                    let text = format!(
+                        "actionId {} comes again, and the action it stands for has ended",
+                        quote(&id)
+                    );
+                    found.broken("ORD-MSG-17", text);
                 }
-            } else if self.known.len() == IDS {
-                self.known.pop_first();
+            } else if self.known.len() == IDS
+                && let Some((oldest, _)) = self.known.pop_first()
+            {
+                self.ended.remove(&oldest);
             }
+            self.ended.remove(&id);
             self.known.insert(id, (place, print));
         }
         judged

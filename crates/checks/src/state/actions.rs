@@ -342,11 +342,22 @@ mod tests {
     }
 
     #[test]
-    fn without_the_tap_a_new_online_counts_as_a_possible_restart() {
-        let mut trace = Trace::subscriber();
-        trace.state(&actions(&[("a", "FINISHED")]));
-        trace.connection("ONLINE").state(&actions(&[]));
-        assert!(trace.judge("state/action-states-kept").findings.is_empty());
+    fn without_the_tap_a_vehicle_that_was_gone_may_have_been_restarted() {
+        for gone in ["OFFLINE", "CONNECTIONBROKEN"] {
+            let mut trace = Trace::subscriber();
+            trace.connection("ONLINE").state(&actions(&[("a", "FINISHED")]));
+            trace.connection(gone).connection("ONLINE").state(&actions(&[]));
+            assert!(trace.judge("state/action-states-kept").findings.is_empty(), "{gone}");
+        }
+    }
+
+    #[test]
+    fn an_online_that_is_said_again_is_no_restart() {
+        for mut trace in [Trace::subscriber(), Trace::tap()] {
+            trace.state(&actions(&[("a", "FINISHED")]));
+            trace.connection("ONLINE").state(&actions(&[]));
+            assert!(!trace.judge("state/action-states-kept").findings.is_empty());
+        }
     }
 
     #[test]

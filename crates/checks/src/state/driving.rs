@@ -11,7 +11,7 @@ use crate::finding::{broken, quote, show};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_view::{ActionState, Deviation, Member, Number, OrderView, Pose, StateView};
-use tck_world::{Fact, Listen, Observation, Topic, last_node};
+use tck_world::{Fact, Listen, Observation, SentOrder, Topic, last_node};
 
 /// Faster than this in a state without `driving` is no measuring noise, in metres and radians per second.
 const MOVING: f64 = 0.2;
@@ -45,6 +45,7 @@ pub(crate) const DRIVING: Check = Check {
         Listen::ToVehicle(Topic::InstantActions),
         Listen::ToVehicle(Topic::Order),
         Listen::Connect,
+        Listen::Delivered(Topic::Connection),
         Listen::Hook,
         Listen::Answer,
         Listen::Delivered(Topic::State),
@@ -59,18 +60,19 @@ pub(crate) const POSITION_MOVES: Check = Check {
     name: "state/position-moves",
     decides: &["MAP-01"],
     doc: "The position of a vehicle that has come from one node to another, more than a metre away by the positions in \
-          its orders, is another one. Judged when it did not change twice in a row, and not for nodes that count as \
-          reached from more than a metre away.",
+          its orders, is another one. Judged when it did not change twice in a row, and neither for nodes that count as \
+          reached from more than a metre away nor for the first node of an order.",
     arguments: &[],
     listens: &[
         Listen::ToVehicle(Topic::InstantActions),
         Listen::ToVehicle(Topic::Order),
         Listen::Connect,
+        Listen::Delivered(Topic::Connection),
         Listen::Hook,
         Listen::Answer,
         Listen::Delivered(Topic::State),
     ],
-    reads: &[Fact::Displaced],
+    reads: &[Fact::Displaced, Fact::Orders],
     needs: &[StateView::position, StateView::last_node_id],
     start: |_| Box::new(PositionMoves::default()),
 };
@@ -234,13 +236,16 @@ impl PositionMoves {
             let (Some(x), Some(y)) = (position.x.float(), position.y.float()) else {
                 continue;
             };
+            let Some(id) = node.node_id.text().filter(|id| !id.is_empty()) else {
+                continue;
+            };
             let range = position.allowed_deviation_xy.there().and_then(Deviation::radius);
             // Who is counted as on a node from afar need not come to it.
             if range.is_some_and(|range| range > APART) {
-                self.nodes.remove(node.node_id.or_empty());
+                self.nodes.remove(id);
             } else if self.nodes.len() < NODES {
                 let place = (position.map_id.or_empty().to_owned(), x, y);
-                self.nodes.insert(node.node_id.or_empty().to_owned(), place);
+                self.nodes.insert(id.to_owned(), place);
             }
         }
     }
@@ -263,7 +268,8 @@ impl Running for PositionMoves {
         let Some(state) = record.state() else {
             return false;
         };
-        let (Some(pose), Some((node, _))) = (state.pose(), last_node(state)) else {
+        let last = last_node(state).filter(|(node, _)| !node.is_empty());
+        let (Some(pose), Some((node, sequence))) = (state.pose(), last) else {
             self.before = None;
             return false;
         };
@@ -293,6 +299,13 @@ impl Running for PositionMoves {
         let (Some(from), Some(to)) = (self.nodes.get(&last), self.nodes.get(&node)) else {
             return false;
         };
+        // Where an order begins, its first node is put under a vehicle that stands.
+        let update = state.order_update_id.whole().unwrap_or_default();
+        let begins = |sent: &SentOrder| sent.first() == sequence;
+        let orders = context.world.orders();
+        if orders.candidates(state.order_id.or_empty(), update).any(begins) {
+            return false;
+        }
         if from.0 != to.0 || pose.map_id != was.map_id || (from.1 - to.1).hypot(from.2 - to.2) < APART {
             return false;
         }

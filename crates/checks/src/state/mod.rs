@@ -5,6 +5,7 @@ pub(super) mod actions;
 pub(super) mod battery;
 pub(super) mod bursts;
 pub(super) mod driving;
+pub(super) mod joint_loads;
 pub(super) mod known;
 pub(super) mod loads;
 pub(super) mod map_changes;

@@ -194,7 +194,7 @@ mod tests {
     fn a_restart_forgives_an_empty_order() {
         let mut trace = Trace::subscriber();
         trace.state(&shows("a", 0, "AUTOMATIC"));
-        trace.message("connection", &json!({ "connectionState": "ONLINE" }));
+        trace.connection("OFFLINE").connection("ONLINE");
         trace.state(&shows("", 0, "AUTOMATIC"));
         assert!(trace.judge("state/order-kept").findings.is_empty());
     }

@@ -23,6 +23,7 @@ pub(crate) const PAUSE_STANDS: Check = Check {
         Listen::ToVehicle(Topic::InstantActions),
         Listen::ToVehicle(Topic::Order),
         Listen::Connect,
+        Listen::Delivered(Topic::Connection),
         Listen::Hook,
         Listen::Answer,
         Listen::Delivered(Topic::State),

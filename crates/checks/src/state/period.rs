@@ -39,6 +39,8 @@ pub(crate) const PERIOD: Check = Check {
         Listen::Hook,
         Listen::Answer,
         Listen::Elsewhere,
+        Listen::ToVehicle(Topic::Order),
+        Listen::ToVehicle(Topic::InstantActions),
         Listen::Published(Topic::State),
         Listen::Delivered(Topic::State),
         Listen::Delivered(Topic::Connection),
@@ -76,6 +78,8 @@ struct Period {
     remarked: Option<u64>,
     /// When the tap saw a state that was not delivered yet.
     sent: Option<Moment>,
+    /// The first message that was sent to the vehicle since.
+    asked: Option<u64>,
     /// Whether a state was ever delivered.
     seen: bool,
     /// How long the harness was held up since then.
@@ -104,7 +108,11 @@ impl Period {
             finding.verdict = Some(Verdict::Inconclusive);
             findings.push(finding);
         } else if gap > limit {
-            findings.push(broken("STATE-02", seq, format!("no state for {seconds:.1} s")));
+            let asked = self
+                .asked
+                .map(|seq| format!("; the first message that it was sent meanwhile is #{seq}"));
+            let text = format!("no state for {seconds:.1} s{}", asked.unwrap_or_default());
+            findings.push(broken("STATE-02", seq, text));
         } else if let Some(own) = self.own.filter(|own| net > *own + MARGIN) {
             let text = format!(
                 "no state for {seconds:.1} s, although the factsheet says every {:.1} s",
@@ -139,6 +147,9 @@ impl Running for Period {
             _ if record.outside_influence() => self.since = None,
             _ => {}
         }
+        if record.is_to_vehicle(Topic::Order) || record.is_to_vehicle(Topic::InstantActions) {
+            self.asked.get_or_insert(record.seq());
+        }
         if record.device_publish().is_some() {
             match record.topic() {
                 Some(Topic::State) => _ = self.sent.get_or_insert(now.0),
@@ -156,6 +167,7 @@ impl Running for Period {
                 let judged = !record.link.disturbed && self.judge(&record.now(), now.1, context, findings);
                 self.since = (!record.link.disturbed).then_some(now);
                 self.sent = None;
+                self.asked = None;
                 self.lag = Duration::ZERO;
                 judged
             }

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use crate::finding::{broken, quote};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_view::{Deviation, NodePosition, OrderView, Position, StateView};
-use tck_world::{Listen, Observation, Topic, sets_position};
+use tck_world::{Fact, Listen, Observation, Topic, sets_position};
 
 /// A vehicle that was stopped does not name a node it has not come to as its last one.
 pub(crate) const LAST_NODE_PLACE: Check = Check {
@@ -26,7 +26,7 @@ pub(crate) const LAST_NODE_PLACE: Check = Check {
         Listen::ToVehicle(Topic::Order),
         Listen::Delivered(Topic::State),
     ],
-    reads: &[],
+    reads: &[Fact::Restarts],
     needs: &[StateView::last_node_id, StateView::position],
     start: |_| Box::new(LastNodePlace::default()),
 };
@@ -129,8 +129,13 @@ impl LastNodePlace {
 }
 
 impl Running for LastNodePlace {
-    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        if record.outside_influence() || record.may_be_a_restart() {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        if record.outside_influence() || context.world.restarts().now(record) {
             self.last = None;
         }
         if let Some(order) = record.order_to_vehicle() {

@@ -167,7 +167,7 @@ fn row(
                 StepEnd::Interrupted => ("interrupted".to_owned(), text(path)),
                 StepEnd::Broken(why) => ("the harness broke".to_owned(), text(why)),
                 StepEnd::Skipped(why) => ("the test is skipped".to_owned(), text(why)),
-                StepEnd::Refused(why) => ("the device does not do it".to_owned(), text(why)),
+                StepEnd::Refused(why) | StepEnd::Declined(why) => ("the device does not do it".to_owned(), text(why)),
             };
             let mut row = plain(entry, What::Box(Harness), title, detail);
             row.class = "trouble";

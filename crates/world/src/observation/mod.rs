@@ -471,12 +471,6 @@ impl<'a> Observation<'a> {
         self.kind == Kind::CONNECT
     }
 
-    /// Whether the device may have been restarted: it opens a connection, or says something about it.
-    #[must_use]
-    pub fn may_be_a_restart(&self) -> bool {
-        self.connects() || self.is_delivered(Topic::Connection)
-    }
-
     /// The fingerprint of the message without what changes when it is sent again.
     #[must_use]
     pub fn content(&self) -> Option<Print> {

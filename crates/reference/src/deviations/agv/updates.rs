@@ -22,6 +22,16 @@ records! {
                 agv.repeat_actions(joint.sequence_id);
             }
         });
+    fault "joint-pick-unseen" ["ORD-UPD-07"] "An update that repeats the pick of a stitching node already traversed makes it pick once more, over before the next state."
+        => updating(|agv, order| {
+            let joint = &order.nodes[0];
+            let origin = Origin::Node(joint.sequence_id);
+            let is_pick = |action: &Action| action.origin == origin && is(action, Effect::Pick) && action.status == Status::Finished;
+            let repeats = !is_ahead(agv, joint.sequence_id) && !joint.actions.is_empty() && agv.actions.iter().any(is_pick);
+            if let Some(load) = agv.loads.last().filter(|_| repeats).cloned() {
+                agv.loads.push(load);
+            }
+        });
     fault "joint-position-replaced" ["ORD-UPD-07"] "It replaces the nodePosition of a stitching node still ahead by the one in the update."
         => updating(|agv, order| {
             let joint = &order.nodes[0];

@@ -45,6 +45,8 @@ records! {
         });
     fault "pause-id-repeats" ["ORD-MSG-17"] "Every startPause has the same actionId."
         => made_of("startPause", |_, a| a.set("actionId", "pause"));
+    fault "cancel-id-repeats" ["ORD-MSG-17"] "Every cancelOrder has the same actionId."
+        => made_of("cancelOrder", |_, a| a.set("actionId", "cancel"));
     fault "stop-pause-with-id-of-start-pause" ["ORD-MSG-17"] "It sends stopPause with the actionId of the startPause that it ends."
         => keep::<Option<Value>>().makes(|pause, _, _, a, _, _| match a.text("actionType") {
             "startPause" => *pause = a.get("actionId").cloned(),
