@@ -291,7 +291,7 @@ impl<'r> Audit<'r> {
         self.elsewhere += 1;
         let wanted = |beside: &Beside| self.options.wants_vehicle(&beside.manufacturer, &beside.serial_number);
         if let Some(beside) = self.topics.beside(&message.topic).filter(wanted) {
-            self.misnamed.note(number, beside, message);
+            self.misnamed.note(&self.rules.packs, number, beside, message);
         }
     }
 

@@ -4,8 +4,7 @@
 //! belongs on the topic of the right name comes there, and nothing on that.
 
 use std::collections::BTreeMap;
-
-use serde_json::Value;
+use std::sync::Arc;
 
 use super::Options;
 use super::result::{AuditResult, FindingResult, SideResult};
@@ -13,7 +12,8 @@ use super::topics::Beside;
 use tck_base::verdict::Verdict;
 use tck_capture::Message;
 use tck_judge::Rules;
-use tck_pack::Role;
+use tck_pack::{Pack, Packs, Role};
+use tck_view::{MessageView, Topic};
 
 /// The monitor that judges the names of topics where all traffic is seen.
 const MONITOR: &str = "topic/names";
@@ -35,7 +35,7 @@ struct Seen {
 
 impl Misnamed {
     /// Notes a message on a topic of no known name.
-    pub fn note(&mut self, number: u64, beside: Beside, message: &Message) {
+    pub fn note(&mut self, packs: &Packs, number: u64, beside: Beside, message: &Message) {
         let at = message.at.map(|at| format!("{at:.3}")).unwrap_or_default();
         if let Some(known) = self.0.get_mut(&message.topic) {
             known.finding.count += 1;
@@ -43,7 +43,7 @@ impl Misnamed {
             return;
         }
         let certain = beside.differs_in_spelling;
-        if self.0.len() >= MOST || !(certain || belongs(&beside.meant, &message.payload)) {
+        if self.0.len() >= MOST || !(certain || belongs(packs, &beside.meant, &message.payload)) {
             return;
         }
         let finding = FindingResult {
@@ -107,19 +107,18 @@ impl Misnamed {
     }
 }
 
-/// Whether this is what comes on the topic of that name.
-fn belongs(name: &str, payload: &[u8]) -> bool {
-    let Ok(message) = serde_json::from_slice::<Value>(payload) else {
-        return false;
-    };
-    let has = |member: &str| message.get(member).is_some();
-    match name {
-        "order" => has("orderId") && message.get("nodes").is_some_and(Value::is_array),
-        "instantActions" => has("headerId") && message.get("actions").is_some_and(Value::is_array),
-        "state" => has("operatingMode") && has("actionStates"),
-        "connection" => has("connectionState"),
-        "factsheet" => has("typeSpecification"),
-        "visualization" => has("headerId") && (has("agvPosition") || has("velocity")),
-        _ => false,
-    }
+/// Whether this is what comes on the topic of that name in one of the versions.
+fn belongs(packs: &Packs, name: &str, payload: &[u8]) -> bool {
+    let read = |pack: &Arc<Pack>| MessageView::of_slice(Topic::of_name(name), payload, pack.names()).ok();
+    packs.all().iter().filter_map(read).any(|message| match message {
+        MessageView::Order(order) => order.order_id.is_there() && order.nodes.is_there(),
+        MessageView::InstantActions(message) => message.header.header_id.is_there() && message.actions.is_there(),
+        MessageView::State(state) => state.operating_mode.is_there() && state.action_states.is_there(),
+        MessageView::Connection(connection) => connection.connection_state.is_there(),
+        MessageView::Factsheet(factsheet) => factsheet.type_specification.is_there(),
+        MessageView::Visualization(message) => {
+            message.header.header_id.is_there() && (message.position.is_there() || message.velocity.is_there())
+        }
+        MessageView::Responses(_) | MessageView::ZoneSet(_) | MessageView::Other(_) => false,
+    })
 }

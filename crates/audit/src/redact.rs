@@ -1,7 +1,7 @@
 //! Recordings without what only their owner should know: names of makers, vehicles, maps, nodes, orders and loads, free texts, and
 //! where on the floor something is. What is equal stays equal, so nearly everything is judged as before.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use serde_json::{Map, Value};
 
@@ -9,12 +9,16 @@ use super::topics::Topics;
 use super::{AuditError, Options};
 use tck_capture::Message;
 use tck_judge::Rules;
+use tck_view::{
+    ControlPoint, Field, IntermediatePath, Names, Node, NodePosition, NodeState, Parameter, Point, Position, Reference,
+    StateView, Trajectory, VisualizationView, Waypoint, Zone,
+};
 
 /// How deep a message is entered; what is deeper is left out.
 const DEPTH: usize = 64;
 
-/// Members that hold a name, and what it is the name of.
-const NAMES: [(&str, &str); 24] = [
+/// Members that hold a name or a free text, by their usual name, and what it is the name of.
+const NAMES: [(&str, &str); 30] = [
     ("manufacturer", "maker"),
     ("serialNumber", "vehicle"),
     ("orderId", "order"),
@@ -22,6 +26,7 @@ const NAMES: [(&str, &str); 24] = [
     ("startNodeId", "node"),
     ("endNodeId", "node"),
     ("lastNodeId", "node"),
+    ("traversedNodes", "node"),
     ("edgeId", "edge"),
     ("actionId", "action"),
     ("mapId", "map"),
@@ -29,24 +34,93 @@ const NAMES: [(&str, &str); 24] = [
     ("zoneId", "zone"),
     ("loadId", "load"),
     ("loadPosition", "place"),
-    ("stationName", "station"),
-    ("mapDownloadLink", "link"),
+    ("description", "text"),
+    ("seriesDescription", "text"),
+    ("orderDescription", "text"),
     ("errorDescription", "text"),
     ("errorHint", "text"),
+    ("translationValue", "text"),
     ("infoDescription", "text"),
     ("nodeDescription", "text"),
     ("edgeDescription", "text"),
     ("actionDescription", "text"),
+    ("actionDescriptor", "text"),
     ("mapDescription", "text"),
+    ("zoneSetDescriptor", "text"),
+    ("zoneDescriptor", "text"),
     ("resultDescription", "text"),
 ];
 
+/// Parameters of actions that hold a name and are called like no member.
+const PARAMETERS: [(&str, &str); 2] = [("stationName", "station"), ("mapDownloadLink", "link")];
+
 /// Members that hold a point of the floor, or several.
-const POINTS: [&str; 3] = ["agvPosition", "nodePosition", "controlPoints"];
+const POINTS: [Field; 7] = [
+    StateView::position,
+    VisualizationView::position,
+    Node::node_position,
+    NodeState::node_position,
+    Trajectory::control_points,
+    IntermediatePath::polyline,
+    Zone::vertices,
+];
+
+/// The coordinates of a point of the floor.
+const COORDINATES: [(Field, Field); 5] = [
+    (Position::x, Position::y),
+    (NodePosition::x, NodePosition::y),
+    (ControlPoint::x, ControlPoint::y),
+    (Waypoint::x, Waypoint::y),
+    (Point::x, Point::y),
+];
+
+/// Members beside each other of which the first says what the second holds.
+const PAIRS: [(Field, Field); 2] = [(Reference::key, Reference::value), (Parameter::key, Parameter::value)];
+
+/// What is sought in messages, by every name that a version has for it.
+struct Members {
+    /// What a member, or a parameter of an action, is the name of.
+    names: HashMap<String, &'static str>,
+    points: BTreeSet<String>,
+    coordinates: BTreeSet<(String, String)>,
+    pairs: BTreeSet<(String, String)>,
+}
+
+impl Members {
+    fn of<'n>(versions: impl Iterator<Item = &'n Names> + Clone) -> Self {
+        let names_of = |field: Field| {
+            let names = versions.clone().filter_map(move |names| names.name(field));
+            // What was moved into another object is found there by the last part.
+            names.map(|name| name.rsplit('/').next().unwrap_or(name).to_owned())
+        };
+        let both = |(one, other): (Field, Field)| names_of(one).zip(names_of(other));
+        let mut names: HashMap<String, &'static str> = HashMap::new();
+        for (name, kind) in PARAMETERS.into_iter().chain(NAMES) {
+            names.insert(name.to_owned(), kind);
+            let fields = Field::all().filter(|field| field.usual_name() == name);
+            names.extend(fields.flat_map(&names_of).map(|name| (name, kind)));
+        }
+        Self {
+            names,
+            points: POINTS.into_iter().flat_map(&names_of).collect(),
+            coordinates: COORDINATES.into_iter().flat_map(both).collect(),
+            pairs: PAIRS.into_iter().flat_map(both).collect(),
+        }
+    }
+
+    fn kind_of(&self, member: &str) -> Option<&'static str> {
+        self.names.get(member).copied()
+    }
+
+    fn is_coordinate(&self, name: &str) -> bool {
+        self.coordinates.iter().any(|(x, y)| x == name || y == name)
+    }
+}
 
 /// Replaces names and places, always alike.
 pub struct Redactor {
     topics: Topics,
+    members: Members,
     /// What stands for a name, by what it is the name of.
     names: HashMap<(&'static str, String), String>,
     counts: HashMap<&'static str, u64>,
@@ -62,6 +136,7 @@ impl Redactor {
     pub fn new(rules: &Rules, options: &Options) -> Result<Self, AuditError> {
         Ok(Self {
             topics: Topics::new(&rules.packs, options.topic_template.as_deref())?,
+            members: Members::of(rules.packs.all().iter().map(|pack| pack.names().as_ref())),
             names: HashMap::new(),
             counts: HashMap::new(),
             origin: None,
@@ -132,52 +207,65 @@ impl Redactor {
 
     fn object(&mut self, object: &mut Map<String, Value>, depth: usize) {
         // A reference or a parameter has the name of its value beside it.
-        for (key, member) in [("referenceKey", "referenceValue"), ("key", "value")] {
-            let kind = object
-                .get(key)
-                .and_then(Value::as_str)
-                .map(|key| kind_of(key).unwrap_or("value"));
-            if let (Some(kind), Some(Value::String(text))) = (kind, object.get_mut(member)) {
-                *text = self.name(kind, text);
+        let key_of =
+            |object: &Map<String, Value>, key: &str| object.get(key).and_then(Value::as_str).map(str::to_owned);
+        let pairs = self.members.pairs.iter();
+        let beside = pairs.filter_map(|(key, value)| Some((key_of(object, key)?, value.clone())));
+        for (key, value) in beside.collect::<Vec<_>>() {
+            let kind = self.members.kind_of(&key).unwrap_or("value");
+            let is_coordinate = self.members.is_coordinate(&key);
+            match object.get_mut(&value) {
+                Some(Value::String(text)) => *text = self.name(kind, text),
+                Some(number @ Value::Number(_)) if is_coordinate => *number = Value::from(0),
+                _ => {}
             }
-        }
-        let is_position = matches!(object.get("key").and_then(Value::as_str), Some("x" | "y"));
-        if is_position && object.get("value").is_some_and(Value::is_number) {
-            object.insert("value".to_owned(), Value::from(0));
         }
         for (name, value) in object.iter_mut() {
-            if let (Some(kind), Value::String(text)) = (kind_of(name), &mut *value) {
-                *text = self.name(kind, text);
-                continue;
+            if let Some(kind) = self.members.kind_of(name) {
+                self.named(kind, value);
             }
-            if POINTS.contains(&name.as_str()) {
-                match &mut *value {
-                    Value::Array(all) => all.iter_mut().for_each(|point| self.point(point)),
-                    point => self.point(point),
-                }
+            if self.members.points.contains(name) {
+                self.point(value, depth + 1);
             }
             self.value(value, depth + 1);
         }
     }
 
-    /// Moves a point of the floor by as much as all others.
-    fn point(&mut self, point: &mut Value) {
-        let (Some(x), Some(y)) = (
-            point.get("x").and_then(Value::as_f64),
-            point.get("y").and_then(Value::as_f64),
-        ) else {
-            return;
-        };
-        let (from_x, from_y) = *self.origin.get_or_insert((x, y));
-        // To the tenth of a millimetre, so that no digit tells where it was.
-        let moved = |at: f64, from: f64| Value::from(((at - from) * 10_000.0).round() / 10_000.0);
-        point["x"] = moved(x, from_x);
-        point["y"] = moved(y, from_y);
+    /// Replaces a name, or each one of a list.
+    fn named(&mut self, kind: &'static str, value: &mut Value) {
+        match value {
+            Value::String(text) => *text = self.name(kind, text),
+            Value::Array(all) => {
+                for one in all {
+                    if let Value::String(text) = one {
+                        *text = self.name(kind, text);
+                    }
+                }
+            }
+            _ => {}
+        }
     }
-}
 
-fn kind_of(member: &str) -> Option<&'static str> {
-    NAMES.iter().find(|(name, _)| *name == member).map(|(_, kind)| *kind)
+    /// Moves the points of the floor in a value by as much as all others.
+    fn point(&mut self, value: &mut Value, depth: usize) {
+        let object = match value {
+            _ if depth > DEPTH => return,
+            Value::Array(all) => return all.iter_mut().for_each(|point| self.point(point, depth + 1)),
+            Value::Object(object) => object,
+            _ => return,
+        };
+        let number = |name: &String| object.get(name).and_then(Value::as_f64);
+        let names = self.members.coordinates.iter();
+        let mut found = names.filter_map(|names| Some((names.clone(), (number(&names.0)?, number(&names.1)?))));
+        if let Some(((x, y), at)) = found.next() {
+            let from = *self.origin.get_or_insert(at);
+            // To the tenth of a millimetre, so that no digit tells where it was.
+            let moved = |at: f64, from: f64| Value::from(((at - from) * 10_000.0).round() / 10_000.0);
+            object.insert(x, moved(at.0, from.0));
+            object.insert(y, moved(at.1, from.1));
+        }
+        object.values_mut().for_each(|inside| self.point(inside, depth + 1));
+    }
 }
 
 #[cfg(test)]
@@ -237,6 +325,28 @@ mod tests {
             redactor.message(of("SECRET/log", &json!({ "a": "SECRET" }))).payload,
             "{}"
         );
+    }
+
+    #[test]
+    fn what_a_version_calls_otherwise_is_redacted_by_that_name() {
+        for (name, _) in NAMES {
+            assert!(Field::all().any(|field| field.usual_name() == name), "{name}");
+        }
+        let library = tck_testing::library();
+        let mut redactor = Redactor::new(&library.rules, &Options::default()).expect("a template");
+        let names: Names = serde_json::from_value(json!({
+            "state": { "agvPosition": "mobileRobotPosition", "lastNodeId": "lastPassed" },
+            "position": { "x": "place/east", "y": "place/north" },
+            "reference": { "referenceKey": "about", "referenceValue": "which" },
+        }))
+        .expect("names");
+        redactor.members = Members::of([&Names::default(), &names].into_iter());
+        let mut state = json!({ "lastPassed": "SECRET", "errors": [{ "errorReferences": [{ "about": "nodeId", "which": "SECRET" }] }],
+            "mobileRobotPosition": { "theta": 1.5, "place": { "east": 47.0, "north": 11.0 } } });
+        redactor.value(&mut state, 0);
+        let expected = json!({ "lastPassed": "node-1", "errors": [{ "errorReferences": [{ "about": "nodeId", "which": "node-1" }] }],
+            "mobileRobotPosition": { "theta": 1.5, "place": { "east": 0.0, "north": 0.0 } } });
+        assert_eq!(state, expected);
     }
 
     #[test]

@@ -3,8 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
-
 use super::result::{AuditResult, RESULT_FORMAT};
 use tck_base::verdict::Verdict;
 use tck_report::clean::line;
@@ -48,9 +46,13 @@ pub fn path_of(bundle: &Path) -> PathBuf {
 /// Whether a bundle, or a file, is the result of an audit.
 #[must_use]
 pub fn is_audit(bundle: &Path) -> bool {
+    /// What every result begins with.
+    #[derive(serde::Deserialize)]
+    struct Head {
+        format: String,
+    }
     let text = std::fs::read(path_of(bundle)).unwrap_or_default();
-    let format = |value: Value| Some(value.get("format")?.as_str()? == RESULT_FORMAT);
-    serde_json::from_slice(&text).ok().and_then(format).unwrap_or_default()
+    serde_json::from_slice(&text).is_ok_and(|head: Head| head.format == RESULT_FORMAT)
 }
 
 /// Reads the result of a bundle.

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use regex::Regex;
+use regex::{Captures, Regex};
 
 use super::AuditError;
 use tck_pack::Packs;
@@ -54,6 +54,11 @@ pub(super) struct Beside {
 fn plain(name: &str) -> String {
     let letters = name.chars().filter(char::is_ascii_alphanumeric);
     letters.map(|letter| letter.to_ascii_lowercase()).collect()
+}
+
+/// A level of a topic, by its name in the template; empty where the template does not have it.
+fn level(found: &Captures<'_>, part: &str) -> String {
+    found.name(part).map_or("", |part| part.as_str()).to_owned()
 }
 
 /// How topics are built.
@@ -127,11 +132,10 @@ impl Topics {
             let mut names = self.names.iter();
             names.find(|known| strsim::osa_distance(&plain(known), &plain(written)) <= (known.len() / 4).min(2))
         };
-        let text = |part: &str| found.name(part).map_or("", |part| part.as_str()).to_owned();
         Some(Beside {
             topics: format!("{}{{topic}}{}", &topic[..name.start()], &topic[name.end()..]),
-            manufacturer: text("manufacturer"),
-            serial_number: text("serialNumber"),
+            manufacturer: level(&found, "manufacturer"),
+            serial_number: level(&found, "serialNumber"),
             differs_in_spelling: same.is_some(),
             meant: same.or_else(near)?.clone(),
         })
@@ -144,16 +148,12 @@ impl Topics {
         if !self.names.contains(name.as_str()) {
             return None;
         }
-        let level = |part: &str| {
-            let part = found.name(part);
-            part.map(|part| part.as_str().to_owned()).unwrap_or_default()
-        };
         let around = (topic[..name.start()].to_owned(), topic[name.end()..].to_owned());
         Some(Named {
             key: format!("{}\n{}", around.0, around.1),
-            manufacturer: level("manufacturer"),
-            serial_number: level("serialNumber"),
-            major: level("majorVersion").parse().ok(),
+            manufacturer: level(&found, "manufacturer"),
+            serial_number: level(&found, "serialNumber"),
+            major: level(&found, "majorVersion").parse().ok(),
             name: name.as_str().to_owned(),
             around,
         })
