@@ -102,7 +102,7 @@ impl Members {
         }
         Self {
             names,
-            points: POINTS.into_iter().flat_map(names_of).collect(),
+            points: POINTS.into_iter().flat_map(&names_of).collect(),
             coordinates: COORDINATES.into_iter().flat_map(both).collect(),
             pairs: PAIRS.into_iter().flat_map(both).collect(),
         }
