@@ -193,18 +193,6 @@ records! {
             .happens(|errors, agv, event| if event == Event::Begun {
                 agv.errors.active = std::mem::take(errors);
             });
-    fault "order-errors-never-go" ["ORD-REJ-08", "ORD-REJ-03"] "The second report of a refused order, and those behind it, stay in errors whatever order is accepted."
-        => keep::<Vec<ActiveError>>()
-            .adopts(|errors, agv, _| {
-                errors.clone_from(&agv.errors.active);
-                true
-            })
-            .happens(|errors, agv, event| if event == Event::Begun {
-                let kept = std::mem::take(errors);
-                if kept.len() > 1 {
-                    agv.errors.active = kept;
-                }
-            });
     fault "duplicate-reported" ["ORD-REJ-13"] "Raises an error for an order that is sent twice."
         => objecting(|_, _, relation| (relation == Relation::Known).then(|| Refusal::new(Rule::Duplicate, "the order was received before")));
     fault "resend-after-completion-raises-error" ["ORD-REJ-13"] "It ignores an identical re-send while the order runs, but reports an error for it once the order is completed."
