@@ -71,7 +71,10 @@ impl<'a> Pump<'a> {
             both,
             connection,
             direction,
-            reader: Reader::default(),
+            reader: match direction {
+                Direction::FromDevice => Reader::of_client(),
+                Direction::ToDevice => Reader::default(),
+            },
             held: VecDeque::new(),
             held_bytes: 0,
             garbage: 0,
