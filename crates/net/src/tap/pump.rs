@@ -43,6 +43,13 @@ pub(super) struct Both {
     pub(super) changed: Notify,
 }
 
+impl Both {
+    /// Whether the device has sent a CONNECT.
+    pub(super) fn has_begun(&self) -> bool {
+        self.level.load(Relaxed) > 0
+    }
+}
+
 struct Held {
     due: Instant,
     raw: Bytes,
