@@ -9,7 +9,7 @@ use std::sync::Arc;
 use axum::Router;
 use axum::body::to_bytes;
 use axum::extract::{Path, Request, State};
-use axum::http::StatusCode;
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::routing::{get, post};
 use serde_json::{Map, Value};
 use tokio::sync::Mutex;
@@ -18,6 +18,7 @@ use tokio::task::JoinHandle;
 use super::driver::RunningDevice;
 use tck_net::bench::LinkError;
 use tck_net::bench::listen::listen_on;
+use tck_net::bench::patience::PatientListener;
 
 /// No parameters need more.
 const LARGEST_BODY: usize = 64 << 10;
@@ -59,7 +60,7 @@ impl HookServer {
             .fallback(nowhere)
             .with_state(hooks.clone());
         let serving = tokio::spawn(async move {
-            if let Err(error) = axum::serve(listener, router).await {
+            if let Err(error) = axum::serve(PatientListener::new(listener), router).await {
                 tracing::error!(%error, "the hooks are not served any more");
             }
         });
@@ -123,12 +124,22 @@ async fn list(State(hooks): State<Hooks>) -> String {
 }
 
 async fn carry_out(State(hooks): State<Hooks>, Path(name): Path<String>, request: Request) -> Answer {
+    if is_of_a_page(request.headers()) {
+        let text = "a page in a browser may not act on the device\n".to_owned();
+        return (StatusCode::FORBIDDEN, text);
+    }
     hooks.carry_out(&name, request).await
 }
 
 async fn nowhere(State(hooks): State<Hooks>) -> Answer {
     let text = format!("there is nothing here; there are these hooks:\n{}", hooks.list());
     (StatusCode::NOT_FOUND, text)
+}
+
+/// Whether a page in a browser asks: any page that is open somewhere could act on the device otherwise. A browser says where
+/// each POST comes from, and a script does not.
+fn is_of_a_page(headers: &HeaderMap) -> bool {
+    headers.contains_key(header::ORIGIN) || headers.contains_key("sec-fetch-site")
 }
 
 /// The parameters in a body: an object, in which an empty text is a parameter that is not there. A template of a
@@ -156,6 +167,17 @@ mod tests {
         let all = parameters(br#"{"to": "n1", "from": "", "x": 0, "action": null}"#);
         assert_eq!(Value::Object(all.unwrap()), serde_json::json!({"to": "n1", "x": 0}));
         assert_eq!(parameters(b" \n"), Ok(Map::new()));
+    }
+
+    #[test]
+    fn a_page_in_a_browser_is_told_from_a_script() {
+        let with = |name: &'static str, value: &'static str| {
+            let mut headers = HeaderMap::new();
+            headers.insert(name, axum::http::HeaderValue::from_static(value));
+            is_of_a_page(&headers)
+        };
+        assert!(with("origin", "http://elsewhere") && with("origin", "null") && with("sec-fetch-site", "cross-site"));
+        assert!(!with("user-agent", "curl/8.0") && !with("content-type", "application/json"));
     }
 
     #[test]

@@ -13,6 +13,7 @@ use tokio::task::JoinHandle;
 use super::metrics::CONTENT_TYPE;
 use tck_net::bench::LinkError;
 use tck_net::bench::listen::listen_on;
+use tck_net::bench::patience::PatientListener;
 
 /// Somebody who wants the page.
 pub(super) type Asked = oneshot::Sender<String>;
@@ -35,7 +36,7 @@ impl MetricsServer {
         let (sender, asked) = mpsc::channel(16);
         let router = Router::new().route("/metrics", get(metrics)).with_state(sender);
         let serving = tokio::spawn(async move {
-            if let Err(error) = axum::serve(listener, router).await {
+            if let Err(error) = axum::serve(PatientListener::new(listener), router).await {
                 tracing::error!(%error, "the metrics are not served any more");
             }
         });

@@ -21,6 +21,9 @@ const CONNECT: u8 = 1;
 /// Fixed header, protocol name and level, flags and keep-alive of a CONNECT have at least this many bytes.
 const HARMLESS: usize = 12;
 
+/// What the body of a CONNECT begins with.
+const PROTOCOLS: [&[u8]; 2] = [b"\x00\x04MQTT", b"\x00\x06MQIsdp"];
+
 /// A part of the stream.
 #[derive(Clone, Debug)]
 pub struct Piece {
@@ -28,24 +31,15 @@ pub struct Piece {
     pub raw: Bytes,
     /// The packet in them, or what is wrong with them.
     pub content: Result<Packet, String>,
-    /// Whether a password may be among the bytes: a CONNECT that could not be read.
-    secret: bool,
+    /// How many of the first bytes cannot hold a password, should they have to be shown.
+    harmless: usize,
 }
 
 impl Piece {
-    fn new(raw: Bytes, content: Result<Packet, String>, secret: bool) -> Self {
-        let secret = secret || raw.first().is_some_and(|first| first >> 4 == CONNECT);
-        Self { raw, content, secret }
-    }
-
-    /// The bytes as they may be recorded: those of a CONNECT only as far as no password can be among them.
+    /// The bytes as they may be recorded: those of what may be a CONNECT only as far as no password can be among them.
     #[must_use]
     pub fn evidence(&self) -> Bytes {
-        if self.secret {
-            self.raw.slice(..self.raw.len().min(HARMLESS))
-        } else {
-            self.raw.clone()
-        }
+        self.raw.slice(..self.raw.len().min(self.harmless))
     }
 }
 
@@ -59,10 +53,24 @@ pub struct Reader {
     lost: Option<String>,
     /// Whether that happened in a CONNECT.
     lost_in_connect: bool,
+    /// Whether a CONNECT has to come first and has not come, or could not be read: what cannot be read either may be a part of it.
+    doubtful: bool,
+    /// Whether a piece was cut already.
+    begun: bool,
     aliases: HashMap<u16, String>,
 }
 
 impl Reader {
+    /// Of what a client says from the beginning of its connection: what comes in the place of its CONNECT and cannot be read may
+    /// be a CONNECT.
+    #[must_use]
+    pub fn of_client() -> Self {
+        Self {
+            doubtful: true,
+            ..Self::default()
+        }
+    }
+
     /// Tells the direction towards the device which protocol level its CONNECT asked for.
     pub fn set_level(&mut self, level: u8) {
         self.level = Some(level);
@@ -86,17 +94,14 @@ impl Reader {
         }
         if let Some(reason) = &self.lost {
             let reason = reason.clone();
-            return Some(Piece::new(
-                self.buffer.split().freeze(),
-                Err(reason),
-                self.lost_in_connect,
-            ));
+            let raw = self.buffer.split().freeze();
+            return Some(self.piece(raw, Err(reason), self.lost_in_connect));
         }
         let (head, body) = match frame(&self.buffer) {
             Frame::Partial => return None,
             Frame::Whole { head, body } => (head, body),
             Frame::Broken(reason) => {
-                self.lost_in_connect = self.buffer[0] >> 4 == CONNECT;
+                self.lost_in_connect = self.doubtful || self.buffer[0] >> 4 == CONNECT;
                 self.lost = Some(reason);
                 return self.next_piece();
             }
@@ -106,8 +111,18 @@ impl Reader {
             return None;
         }
         let raw = self.buffer.split_to(head + body).freeze();
-        let content = self.decode(raw[0], &raw.slice(head..));
-        Some(Piece::new(raw, content, false))
+        let is_connect = raw[0] >> 4 == CONNECT;
+        let body = raw.slice(head..);
+        if self.doubtful && !is_connect && PROTOCOLS.iter().any(|name| body.starts_with(name)) {
+            let reason = format!("packet type {} with the content of a CONNECT", raw[0] >> 4);
+            return Some(self.piece(raw, Err(reason), true));
+        }
+        let content = self.decode(raw[0], &body);
+        if is_connect {
+            self.doubtful = content.is_err();
+        }
+        let secret = self.doubtful && content.is_err();
+        Some(self.piece(raw, content, secret))
     }
 
     /// What is left when the stream ends: the beginning of a packet that never became whole.
@@ -116,7 +131,23 @@ impl Reader {
             return None;
         }
         let reason = "the connection ended in the middle of a packet".to_owned();
-        Some(Piece::new(self.buffer.split().freeze(), Err(reason), false))
+        let secret = self.doubtful || self.lost_in_connect;
+        let raw = self.buffer.split().freeze();
+        Some(self.piece(raw, Err(reason), secret))
+    }
+
+    /// A piece of the stream; a secret one may hold a password.
+    fn piece(&mut self, raw: Bytes, content: Result<Packet, String>, secret: bool) -> Piece {
+        let is_first = !std::mem::replace(&mut self.begun, true);
+        let is_connect = raw.first().is_some_and(|first| first >> 4 == CONNECT);
+        let harmless = if is_connect || (secret && is_first) {
+            HARMLESS
+        } else if secret {
+            0
+        } else {
+            usize::MAX
+        };
+        Piece { raw, content, harmless }
     }
 
     fn decode(&mut self, first: u8, body: &Bytes) -> Result<Packet, String> {
@@ -349,6 +380,32 @@ mod tests {
             assert!(piece.content.is_err());
             assert!(!piece.evidence().windows(4).any(|part| part == b"s3cr"), "{piece:?}");
             assert_eq!(piece.raw, raw, "it is forwarded untouched");
+        }
+    }
+
+    #[test]
+    fn a_password_is_not_kept_from_what_may_be_a_connect() {
+        let connect = b"\x10\x17\x00\x04MQTT\x04\xc2\x00\x0f\x00\x02id\x00\x01u\x00\x04s3cr";
+        let mut damaged: Vec<Vec<u8>> = (0..=15_u8)
+            .map(|kind| [&[kind << 4][..], &connect[1..]].concat())
+            .collect();
+        // A second one whose length is too short: what is left over looks like packets of its own.
+        damaged.extend((8..0x17).map(|length| [&connect[..], &[0x10, length], &connect[2..]].concat()));
+        damaged.extend((8..0x17).map(|length| [&[0x10, length], &connect[2..]].concat()));
+        for bytes in damaged {
+            let mut reader = Reader::of_client();
+            reader.push(&bytes);
+            let mut all = pieces(&mut reader);
+            all.extend(reader.rest());
+            let raw: Vec<u8> = all.iter().flat_map(|piece| piece.raw.to_vec()).collect();
+            assert_eq!(raw, bytes, "it is forwarded untouched");
+            for piece in all {
+                let kept = match &piece.content {
+                    Ok(packet) => serde_json::to_vec(packet).expect("JSON"),
+                    Err(_) => piece.evidence().to_vec(),
+                };
+                assert!(!kept.windows(4).any(|part| part == b"s3cr"), "{bytes:x?}: {piece:?}");
+            }
         }
     }
 

@@ -10,6 +10,7 @@ pub mod kin;
 pub mod leavings;
 pub mod listen;
 pub mod own;
+pub mod patience;
 pub mod secure;
 pub mod stream;
 pub mod tls;

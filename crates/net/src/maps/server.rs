@@ -20,6 +20,7 @@ use tokio::task::JoinHandle;
 use super::{SLOW_TRANSFER, path_of, wrong_bytes};
 use crate::bench::inbox::Reporter;
 use crate::bench::listen::listen_on;
+use crate::bench::patience::PatientListener;
 use crate::bench::{LinkError, Offer};
 use tck_journal::ServeBehaviour;
 use tck_journal::event::{Direction, Event, Source};
@@ -73,7 +74,7 @@ impl MapServer {
         };
         let router = Router::new().fallback(answer).with_state(shared);
         let serving = tokio::spawn(async move {
-            if let Err(error) = axum::serve(listener, router).await {
+            if let Err(error) = axum::serve(PatientListener::new(listener), router).await {
                 tracing::error!(%error, "the map server has ended");
             }
         });

@@ -16,6 +16,8 @@ use tck_journal::event::{Close, Direction, Event, Source};
 
 /// How long the TLS handshake may take.
 const SETUP_LIMIT: Duration = Duration::from_secs(10);
+/// How long a device may take to say who it is.
+const CONNECT_LIMIT: Duration = Duration::from_secs(20);
 /// How long a side that was told the end may take to close its own.
 const DRAIN_LIMIT: Duration = Duration::from_secs(1);
 
@@ -140,10 +142,19 @@ async fn run(
     let end = tokio::select! {
         biased;
         reset = cut_after(admitted.control.clone(), cuts) => End::Cut { reset },
+        () = nobody(&both) => End::Cut { reset: false },
         () = up.run(from_device, to_broker, shared.control.subscribe()) => End::Device,
         () = down.run(from_broker, to_device, shared.control.subscribe()) => End::Broker,
     };
     (end, both.end_reported.load(std::sync::atomic::Ordering::Relaxed))
+}
+
+/// Waits until nobody has said for so long who he is; for ever once somebody has.
+async fn nobody(both: &Both) {
+    tokio::time::sleep(CONNECT_LIMIT).await;
+    if both.has_begun() {
+        std::future::pending().await
+    }
 }
 
 /// Waits for a cut after the ones that were before this connection; says whether it is by RST.

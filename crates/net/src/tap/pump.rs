@@ -43,6 +43,13 @@ pub(super) struct Both {
     pub(super) changed: Notify,
 }
 
+impl Both {
+    /// Whether the device has sent a CONNECT.
+    pub(super) fn has_begun(&self) -> bool {
+        self.level.load(Relaxed) > 0
+    }
+}
+
 struct Held {
     due: Instant,
     raw: Bytes,
@@ -71,7 +78,10 @@ impl<'a> Pump<'a> {
             both,
             connection,
             direction,
-            reader: Reader::default(),
+            reader: match direction {
+                Direction::FromDevice => Reader::of_client(),
+                Direction::ToDevice => Reader::default(),
+            },
             held: VecDeque::new(),
             held_bytes: 0,
             garbage: 0,

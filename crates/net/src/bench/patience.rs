@@ -1,0 +1,187 @@
+//! HTTP for few and quick clients: whoever does not say what he wants is sent away, and the others wait their turn.
+
+use std::io;
+use std::net::SocketAddr;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+use axum::serve::Listener;
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::time::Sleep;
+
+/// How long the head of the first request of a connection may take.
+const HEAD_LIMIT: Duration = Duration::from_secs(10);
+/// How many connections are open at a time.
+const CONNECTIONS: usize = 64;
+/// How long to wait when the system has no file handle left.
+const NO_HANDLE: Duration = Duration::from_millis(100);
+
+/// A port that serves HTTP to few clients at a time, and waits for none of them for long.
+pub struct PatientListener {
+    listener: TcpListener,
+    limit: Duration,
+    places: Arc<Semaphore>,
+}
+
+impl PatientListener {
+    /// Serves on a port that is open already.
+    #[must_use]
+    pub fn new(listener: TcpListener) -> Self {
+        Self {
+            listener,
+            limit: HEAD_LIMIT,
+            places: Arc::new(Semaphore::new(CONNECTIONS)),
+        }
+    }
+}
+
+impl Listener for PatientListener {
+    type Io = HttpConnection;
+    type Addr = SocketAddr;
+
+    async fn accept(&mut self) -> (Self::Io, Self::Addr) {
+        loop {
+            let Ok(place) = Arc::clone(&self.places).acquire_owned().await else {
+                return std::future::pending().await;
+            };
+            match self.listener.accept().await {
+                Ok((stream, peer)) => {
+                    let connection = HttpConnection {
+                        stream,
+                        head: Head::default(),
+                        limit: Box::pin(tokio::time::sleep(self.limit)),
+                        _place: place,
+                    };
+                    return (connection, peer);
+                }
+                Err(_) => tokio::time::sleep(NO_HANDLE).await,
+            }
+        }
+    }
+
+    fn local_addr(&self) -> io::Result<Self::Addr> {
+        self.listener.local_addr()
+    }
+}
+
+/// A connection of a client, which ends when the head of its first request does not come.
+pub struct HttpConnection {
+    stream: TcpStream,
+    head: Head,
+    limit: Pin<Box<Sleep>>,
+    /// The place it takes until it is dropped.
+    _place: OwnedSemaphorePermit,
+}
+
+/// How much of the end of a head was seen.
+#[derive(Debug, Default)]
+struct Head {
+    is_whole: bool,
+    /// Line ends one after the other.
+    ends: u8,
+}
+
+impl Head {
+    fn see(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            match byte {
+                b'\n' => self.ends += 1,
+                b'\r' => {}
+                _ => self.ends = 0,
+            }
+            self.is_whole |= self.ends == 2;
+            if self.is_whole {
+                return;
+            }
+        }
+    }
+}
+
+impl AsyncRead for HttpConnection {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        if !self.head.is_whole && self.limit.as_mut().poll(context).is_ready() {
+            return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
+        }
+        let before = buffer.filled().len();
+        let read = Pin::new(&mut self.stream).poll_read(context, buffer);
+        if !self.head.is_whole {
+            self.head.see(&buffer.filled()[before..]);
+        }
+        read
+    }
+}
+
+impl AsyncWrite for HttpConnection {
+    fn poll_write(mut self: Pin<&mut Self>, context: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
+        Pin::new(&mut self.stream).poll_write(context, bytes)
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(context)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(context)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use axum::Router;
+    use axum::routing::get;
+    use tokio::io::{AsyncReadExt, AsyncWriteExt};
+
+    use super::*;
+
+    #[tokio::test]
+    async fn who_does_not_say_what_he_wants_is_sent_away_and_the_others_are_served() {
+        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+        let address = listener.local_addr().expect("an address");
+        let patient = PatientListener {
+            limit: Duration::from_millis(300),
+            ..PatientListener::new(listener)
+        };
+        let router = Router::new().route("/", get(|| async { "here" }));
+        let serving = tokio::spawn(async move { axum::serve(patient, router).await });
+        let mut half = Vec::new();
+        for _ in 0..CONNECTIONS + 8 {
+            let mut stream = TcpStream::connect(address).await.expect("a connection");
+            stream
+                .write_all(b"GET / HTTP/1.1\r\nHost: x\r\n")
+                .await
+                .expect("written");
+            half.push(stream);
+        }
+        let mut whole = TcpStream::connect(address).await.expect("a connection");
+        whole
+            .write_all(b"GET / HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
+            .await
+            .expect("written");
+        let mut answer = String::new();
+        let read = tokio::time::timeout(Duration::from_secs(5), whole.read_to_string(&mut answer)).await;
+        assert!(read.is_ok() && answer.ends_with("here"), "{answer:?}");
+        let mut rest = Vec::new();
+        let gone = tokio::time::timeout(Duration::from_secs(5), half[0].read_to_end(&mut rest)).await;
+        assert!(gone.is_ok(), "a half request is open for ever");
+        serving.abort();
+    }
+
+    #[test]
+    fn the_end_of_a_head_is_seen_however_it_comes() {
+        let whole = |parts: &[&str]| {
+            let mut head = Head::default();
+            parts.iter().for_each(|part| head.see(part.as_bytes()));
+            head.is_whole
+        };
+        assert!(whole(&["GET / HTTP/1.1\r\nA: b\r", "\n", "\r\n"]) && whole(&["GET /\n\nbody"]));
+        assert!(!whole(&["GET / HTTP/1.1\r\n", "A: b\r\n"]) && !whole(&[]));
+    }
+}
