@@ -147,7 +147,9 @@ fn exploration() -> Vec<Measured> {
         seed: 1,
         conversations: CONVERSATIONS,
         length: 12,
+        at_once: 4,
         trials: 0,
+        budget: None,
     };
     let drawn = explore.drawn(&explore.grammar, &mut Coverage::default());
     let stimuli: usize = drawn.iter().map(|(chain, _)| chain.stimuli().len()).sum();

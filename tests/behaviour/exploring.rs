@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+use crate::bench::{Bench, Profile};
+use crate::broken::started_by_the_harness;
 use crate::tool::{Ended, run, run_in};
 
 fn prints(ended: &Ended, text: &str) {
@@ -92,7 +94,7 @@ fn the_conversations_end_when_the_time_is_up_and_what_was_found_is_shrunk() {
         "--conversations",
         "1500",
         "--budget",
-        "1s",
+        "6s",
         "--format",
         "json",
     ];
@@ -130,4 +132,67 @@ fn mistakes_of_the_user_are_named() {
     run(&["explore", "--virtual", "--replay", "missing.yaml"])
         .code(2)
         .says("missing.yaml");
+}
+
+/// Five nodes in a line around a corner, in whose middle the built-in vehicle starts.
+const LINE: &str = r#"
+nodes = [
+  { id = "A3", x = 0.0, y = 4.0, map = "reference-floor" }, { id = "A2", x = 0.0, y = 2.0, map = "reference-floor" },
+  { id = "A1", x = 0.0, y = 0.0, map = "reference-floor" }, { id = "B1", x = 2.0, y = 0.0, map = "reference-floor" },
+  { id = "C1", x = 4.0, y = 0.0, map = "reference-floor" },
+]
+edges = [
+  { id = "A3-A2", from = "A3", to = "A2" }, { id = "A2-A3", from = "A2", to = "A3" },
+  { id = "A2-A1", from = "A2", to = "A1" }, { id = "A1-A2", from = "A1", to = "A2" },
+  { id = "A1-B1", from = "A1", to = "B1" }, { id = "B1-A1", from = "B1", to = "A1" },
+  { id = "B1-C1", from = "B1", to = "C1" }, { id = "C1-B1", from = "C1", to = "B1" },
+]
+"#;
+
+#[test]
+fn a_plain_profile_is_explored_and_the_vehicle_is_driven_to_where_conversations_fit() {
+    let bench = Bench::new();
+    let profile = Profile {
+        device: started_by_the_harness(),
+        motion: true,
+        ..Profile::default()
+    };
+    let profile = profile.text();
+    let (before, rest) = profile.split_once("[layout]").unwrap();
+    let (_, behind) = rest.split_once("[time]").unwrap();
+    let profile = format!("{before}[layout]{LINE}[time]{behind}");
+    fs::write(bench.path().join("device.toml"), profile).unwrap();
+    let explore = [
+        "explore",
+        "--profile",
+        "device.toml",
+        "--focus",
+        "order-open",
+        "--focus",
+        "pick",
+    ];
+    let rest = [
+        "--conversations",
+        "2",
+        "--length",
+        "2",
+        "--seed",
+        "1",
+        "--format",
+        "json",
+    ];
+    let explored = bench.run(&[&explore[..], &rest].concat()).code(0);
+    let explored: Value = serde_json::from_str(&explored.stdout).unwrap();
+    assert_eq!(explored["conversations"], 2, "{explored}");
+    assert_eq!(explored["undecided"], 0, "{explored}");
+    assert!(explored["findings"].as_array().unwrap().is_empty(), "{explored}");
+    let left_out = explored["leftOut"].as_array().unwrap();
+    let is_left_out = |name: &str| left_out.iter().any(|one| one["stimulus"] == name);
+    assert!(is_left_out("pick") && !is_left_out("order-open"), "{explored}");
+    let report = bench.path().join(explored["report"].as_str().unwrap());
+    let journal = fs::read_to_string(report.join("journal.jsonl")).unwrap();
+    assert!(
+        journal.contains("the vehicle is driven to node"),
+        "it stood in the middle of a line"
+    );
 }

@@ -42,7 +42,9 @@ fn found(one: &Explored, conversations: usize) -> Vec<Finding> {
         seed: one.seed,
         conversations,
         length: 12,
+        at_once: 4,
         trials: 0,
+        budget: None,
     };
     let drawn = exploration.drawn(&exploration.grammar, &mut Coverage::default());
     crate::found(&mut library, one.role, &drawn, |run| {

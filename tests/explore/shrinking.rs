@@ -70,8 +70,10 @@ fn shrunk(known: &Known, library: &mut Library) -> Result<Chain, String> {
         grammar: whole.clone(),
         seed: 1,
         conversations: DRAWN,
+        at_once: DRAWN,
         length: 10,
         trials: TRIALS,
+        budget: None,
     };
     let mut drawn = exploration.drawn(&focused, &mut Coverage::default());
     drawn.retain(|(chain, _)| holds(chain.stimuli(), &known.stimuli));

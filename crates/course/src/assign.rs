@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::graph::Graph;
 use super::ways::{self, Stop};
-use super::{Course, CourseError, CourseNeed, FAR, HERE, Layout, Node, Standing, is_station};
+use super::{Course, CourseError, CourseNeed, Edge, FAR, HERE, Layout, Node, Standing, is_station};
 
 /// How far from a node the vehicle may stand to be on it, in metres, unless the node allows more.
 const TOLERANCE: f64 = 0.5;
@@ -75,6 +75,34 @@ impl Layout {
             }
         }
         Err(unsatisfiable(need, names.len(), start))
+    }
+
+    /// The shortest way, edge by edge, to a node from which there is a course that `fits`; `None` where there is none.
+    #[must_use]
+    pub fn way_to_fit(
+        &self,
+        need: &CourseNeed,
+        standing: &Standing,
+        fits: impl Fn(&Node, &Course) -> bool,
+    ) -> Option<Vec<&Edge>> {
+        let start = self.standing(standing).ok()?;
+        let graph = Graph::of(self, &start.id);
+        let mut ways: Vec<Vec<usize>> = (1..graph.nodes.len())
+            .filter_map(|node| ways::way(&graph, 0, Stop { node, before: None }))
+            .collect();
+        ways.sort_by_key(Vec::len);
+        let way = ways.into_iter().find(|way| {
+            let Some(end) = way.last().map(|end| graph.nodes[*end]) else {
+                return false;
+            };
+            let course = self.assign(need, &Standing::Node(end.id.clone()));
+            course.is_ok_and(|course| fits(end, &course))
+        })?;
+        let starts = std::iter::once(&0).chain(&way);
+        let edges = starts.zip(&way);
+        edges
+            .map(|(from, to)| self.edge(&graph.nodes[*from].id, &graph.nodes[*to].id))
+            .collect()
     }
 
     /// The course of these places; `None` if there is no node left for `far`.

@@ -206,6 +206,13 @@ impl Course {
         self.ways.get(&(from.to_owned(), to.to_owned())).map(Vec::as_slice)
     }
 
+    /// Whether a way between a station and another node is no way, because both are the same node.
+    #[must_use]
+    pub fn collapses(&self) -> bool {
+        let mut ways = self.ways.iter();
+        ways.any(|((from, to), names)| names.is_empty() && !(is_station(from) && is_station(to)))
+    }
+
     /// The node of a name.
     #[must_use]
     pub fn node(&self, name: &str) -> Option<&Node> {

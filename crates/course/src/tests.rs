@@ -537,3 +537,33 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_vehicle_in_the_middle_of_a_line_is_led_to_where_four_nodes_are_ahead() {
+    let nodes: Vec<String> = (1..=5)
+        .map(|at| format!("{{ id = \"n{at}\", x = {at}.0, y = 0.0, map = \"hall\" }}"))
+        .collect();
+    let edges: Vec<String> = (1..5)
+        .flat_map(|at| [(at, at + 1), (at + 1, at)])
+        .map(|(from, to)| format!("{{ id = \"e{from}{to}\", from = \"n{from}\", to = \"n{to}\" }}"))
+        .collect();
+    let profile = format!(
+        "[device]\nrole = \"agv\"\nmanufacturer = \"acme\"\nserial-number = \"1\"\n[layout]\nnodes = [{}]\nedges = [{}]\n",
+        nodes.join(", "),
+        edges.join(", ")
+    );
+    let layout = layout_of(&profile).expect("a profile").expect("a layout");
+    let four = need("a-b b-c c-d");
+    assert!(layout.assign(&four, &on("n3")).is_err());
+    let way = layout.way_to_fit(&four, &on("n3"), |_, _| true).expect("a way");
+    let ids: Vec<&str> = way.iter().map(|edge| edge.id.as_str()).collect();
+    assert_eq!(ids, ["e32"]);
+    let begins = layout
+        .way_to_fit(&four, &on("n3"), |node, _| node.id == "n5")
+        .expect("a way");
+    assert_eq!(begins.last().map(|edge| edge.end.as_str()), Some("n5"));
+    assert_eq!(
+        layout.way_to_fit(&need("a-b b-c c-d d-e e-f"), &on("n3"), |_, _| true),
+        None
+    );
+}

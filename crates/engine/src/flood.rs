@@ -1,4 +1,4 @@
-//! Ends a run before a device that floods the harness fills the memory of this machine.
+//! Ends a test or a run before a device that floods the harness fills the memory of this machine.
 //!
 //! Everything a run has seen is kept, since any of it may be evidence. What counts is the memory that takes: a vehicle may talk as
 //! much as it likes in a moment, and a long run is no flood. Beside that only the number of messages in a short time is bounded,
@@ -37,8 +37,16 @@ pub struct FloodGuard {
     /// About how many bytes of memory the records take, and how many they may take.
     held: u64,
     memory: u64,
-    /// Why the run has to end.
-    over: Option<String>,
+    /// Why it cannot go on like this.
+    over: Option<Over>,
+}
+
+/// Why a run cannot go on as it does.
+#[derive(Debug)]
+struct Over {
+    why: String,
+    /// It is the device that talks too much, and it would do for it to talk less.
+    may_pass: bool,
 }
 
 impl Default for FloodGuard {
@@ -69,9 +77,10 @@ impl FloodGuard {
     pub fn observe_other(&mut self, entry: &Entry) {
         let count = self.others.add(entry.at().moment);
         if count > OF_OTHERS_AT_MOST {
-            self.ends(format!(
+            let why = format!(
                 "clients that are not the device under test flood the harness: {count} packets and messages came within 30 s"
-            ));
+            );
+            self.ends(why, false);
         }
         self.hold(entry, "from clients that are not the device under test");
     }
@@ -84,9 +93,9 @@ impl FloodGuard {
         if entry.record.direction == Some(Direction::FromDevice) {
             let count = self.device.add(entry.at().moment);
             if count > IN_WINDOW + FOR_EACH_VEHICLE * self.vehicles {
-                self.ends(format!(
-                    "the device under test floods the harness: {count} packets and messages came within 30 s"
-                ));
+                let why =
+                    format!("the device under test floods the harness: {count} packets and messages came within 30 s");
+                self.ends(why, true);
             }
         }
         let of = match entry.record.direction {
@@ -104,25 +113,32 @@ impl FloodGuard {
     fn hold(&mut self, entry: &Entry, of: &str) {
         self.held += entry.held();
         if self.held > self.memory {
-            self.ends(format!(
+            let why = format!(
                 "the records of this run take {} MB of memory, more than is kept; the last came {of}",
                 self.held >> 20
-            ));
+            );
+            self.ends(why, false);
         }
     }
 
-    fn ends(&mut self, why: String) {
-        self.over.get_or_insert_with(|| {
-            format!(
-                "{why}; the run was ended before this machine runs out of memory, and what was found until then stands"
-            )
-        });
+    fn ends(&mut self, why: String, may_pass: bool) {
+        self.over.get_or_insert(Over { why, may_pass });
     }
 
-    /// Why the run has to end, if it has to.
+    /// Why it cannot go on like this, if it cannot.
     #[must_use]
     pub fn over(&self) -> Option<&str> {
-        self.over.as_deref()
+        self.over.as_ref().map(|over| over.why.as_str())
+    }
+
+    /// Counts anew what the device sends. `false` where something else takes too much, which stays so.
+    pub fn begin_anew(&mut self) -> bool {
+        if self.over.as_ref().is_some_and(|over| !over.may_pass) {
+            return false;
+        }
+        self.over = None;
+        self.device = Recent::default();
+        true
     }
 }
 
@@ -203,6 +219,9 @@ mod tests {
         assert_eq!(guard.over(), None);
         after(&mut guard, 2_000, Duration::from_millis(1), 10);
         assert!(guard.over().unwrap().contains("floods"));
+        assert!(guard.begin_anew() && guard.over().is_none());
+        after(&mut guard, 9_000, Duration::from_millis(1), 10);
+        assert_eq!(guard.over(), None, "what came before counts no more");
     }
 
     #[test]
@@ -273,6 +292,7 @@ mod tests {
                 why.contains("101 MB of memory") && why.contains("the device under test"),
                 "{why}"
             );
+            assert!(!guard.begin_anew(), "memory that is taken stays taken");
         }
     }
 

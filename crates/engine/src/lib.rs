@@ -35,7 +35,7 @@ use tck_judge::{JudgeError, Progress, Sign, TestJudge};
 use tck_net::bench::{LinkError, Offer};
 use tck_net::link::Link;
 use tck_pack::HookEffect;
-use tck_suite::model::{Purpose, Section, Step, Test, Verb};
+use tck_suite::model::{Purpose, Section, Step, Test, Verb, place_in_body};
 
 /// More time than this is not left between two orders.
 const LONGEST_INTERVAL: Duration = Duration::from_secs(10);
@@ -87,6 +87,8 @@ pub struct Engine<L, O> {
     pub repetition: Option<u32>,
     /// Whether nobody has answered a question of the test that runs, or ran last.
     pub unanswered: bool,
+    /// Whether it was waited in vain, at the end of a test, for a device to call off what the test has left.
+    cancelled_in_vain: bool,
     /// When the last order was sent.
     last_order: Option<Moment>,
     /// The record since which the device was last said to be gone.
@@ -112,6 +114,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
             map_files: Vec::new(),
             repetition: None,
             unanswered: false,
+            cancelled_in_vain: false,
             last_order: None,
             told_gone: None,
             interrupt,
@@ -195,7 +198,11 @@ impl<L: Link, O: Operator> Engine<L, O> {
         let begun = self.last_seq();
         for (section, steps) in test.sections() {
             let mut spared = None;
+            let mut goes_on_at = 0;
             for step in steps {
+                if place_in_body(&step.path).is_some_and(|at| at < goes_on_at) {
+                    continue;
+                }
                 if step.spec.as_ref().is_some_and(|spec| !spec.contains(version)) {
                     continue;
                 }
@@ -219,10 +226,14 @@ impl<L: Link, O: Operator> Engine<L, O> {
                     break;
                 }
                 watcher.waiting(step);
-                if let Err(error) = self.step(step, section, watcher).await {
-                    // The postamble is still tried: a device must not be left driving.
-                    outcome = outcome.and(Err(error));
-                    break;
+                match self.step(step, section, watcher).await {
+                    Ok(StepEnd::Refused(_)) => goes_on_at = test.goes_on_at(&step.path).unwrap_or(0),
+                    Ok(_) => {}
+                    Err(error) => {
+                        // The postamble is still tried: a device must not be left driving.
+                        outcome = outcome.and(Err(error));
+                        break;
+                    }
                 }
             }
         }
@@ -301,7 +312,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
         has_tap && !vehicle::has_open_connection(judge)
     }
 
-    async fn step(&mut self, step: &Step, section: Section, watcher: &mut dyn Watcher) -> Result<(), EngineError> {
+    async fn step(&mut self, step: &Step, section: Section, watcher: &mut dyn Watcher) -> Result<StepEnd, EngineError> {
         self.drain().await?;
         tracing::debug!(step = step.path, "begins");
         self.note(Event::StepBegun {
@@ -309,6 +320,11 @@ impl<L: Link, O: Operator> Engine<L, O> {
         })?;
         let done = self.perform(step, section, watcher).await;
         let end = match &done {
+            // The test is left for it, and the run may go on.
+            Ok(StepEnd::Interrupted) if !*self.interrupt.borrow() => match self.recorder.flood() {
+                Some(why) => StepEnd::Refused(why.to_owned()),
+                None => StepEnd::Interrupted,
+            },
             Ok(end) => end.clone(),
             Err(error) => StepEnd::Broken(error.to_string()),
         };
@@ -319,9 +335,9 @@ impl<L: Link, O: Operator> Engine<L, O> {
         }
         self.note(Event::StepEnded {
             path: step.path.clone(),
-            end,
+            end: end.clone(),
         })?;
-        done.map(|_| ())
+        done.map(|_| end)
     }
 
     async fn perform(
@@ -362,7 +378,8 @@ impl<L: Link, O: Operator> Engine<L, O> {
             Verb::Serve(serve) => self.serve(serve).await,
             Verb::Operator(operator) => {
                 self.mark(step)?;
-                self.operate(operator, section).await
+                let calls_off = step.purpose == Some(Purpose::CallsOff);
+                self.operate(operator, (section, calls_off)).await
             }
             Verb::Vehicle(vehicle) => self.vehicle_step(vehicle, step).await,
             Verb::Retained(retained) => {
@@ -371,9 +388,23 @@ impl<L: Link, O: Operator> Engine<L, O> {
                     return Ok(StepEnd::Broken(format!("there is no topic {}", retained.topic)));
                 };
                 self.link.fresh_subscriber(&topic).await?;
-                self.wait(section, watcher).await
+                self.wait(section, None, watcher).await
             }
-            Verb::Expect(_) | Verb::Never(_) | Verb::Always(_) | Verb::Action(_) => self.wait(section, watcher).await,
+            Verb::Expect(_) | Verb::Never(_) | Verb::Always(_) | Verb::Action(_) => {
+                let cancels = section == Section::Finally && step.purpose == Some(Purpose::Cancels);
+                let at_most = (cancels && self.cancelled_in_vain).then(|| self.link.now().moment + self.react());
+                let end = self.wait(section, at_most, watcher).await?;
+                // In virtual time nobody waits.
+                if cancels && end == StepEnd::Deadline && at_most.is_none() && !self.operator.runs_on_the_link() {
+                    self.cancelled_in_vain = true;
+                    let text =
+                        "it was waited in vain for the device to call off what a test had left; from here on it is \
+                                waited for no longer than `time.react`"
+                            .to_owned();
+                    self.note(Event::Note { text })?;
+                }
+                Ok(end)
+            }
         }
     }
 
@@ -426,8 +457,20 @@ impl<L: Link, O: Operator> Engine<L, O> {
         Ok(())
     }
 
-    /// Waits for what the judge says, and no longer.
-    async fn wait(&mut self, section: Section, watcher: &mut dyn Watcher) -> Result<StepEnd, EngineError> {
+    /// How long a device may take to react.
+    fn react(&self) -> Duration {
+        let times = self.recorder.judge().ground().bindings.get("time");
+        let react = times.and_then(|times| times.get("react")).and_then(Value::as_u64);
+        react.map_or(LONGEST_INTERVAL, Duration::from_millis)
+    }
+
+    /// Waits for what the judge says, and no longer; `at_most` ends it before.
+    async fn wait(
+        &mut self,
+        section: Section,
+        at_most: Option<Moment>,
+        watcher: &mut dyn Watcher,
+    ) -> Result<StepEnd, EngineError> {
         let mut probed = false;
         loop {
             self.tell_gone(watcher);
@@ -437,6 +480,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
             let Some(until) = time_for(test, probed) else {
                 return Ok(StepEnd::Decided);
             };
+            let until = at_most.map_or(until, |end| end.min(until));
             let probing = matches!(test.progress(), Progress::NeedsProbe(_)) && !probed;
             // The postamble runs even when the user has asked to stop: a device must not be left driving.
             if self.recorder.flood().is_some() || (section != Section::Finally && self.interrupted()) {
@@ -460,7 +504,8 @@ impl<L: Link, O: Operator> Engine<L, O> {
                 self.recorder.record(occurrence)?;
                 // The time is up even if a device never stops talking.
                 let test = self.recorder.judge().current();
-                if test.is_some_and(|test| time_for(test, probed).is_none_or(|until| now <= until)) {
+                let is_in_time = |until: Moment| now <= at_most.map_or(until, |end| end.min(until));
+                if test.is_some_and(|test| time_for(test, probed).is_none_or(is_in_time)) {
                     continue;
                 }
             } else if silence.is_some() {

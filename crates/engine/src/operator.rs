@@ -59,6 +59,19 @@ pub trait Operator {
         None
     }
 
+    /// Whether the device was started for the run, and can be started again without a hook.
+    fn has_program(&self) -> bool {
+        false
+    }
+
+    /// Starts the device again that was started for the run; `Err` says why it could not be.
+    ///
+    /// # Errors
+    /// There is no such program, or it cannot be started.
+    async fn start_program_again(&mut self) -> Result<(), String> {
+        Err("nothing was started for the run".to_owned())
+    }
+
     /// Ends what was started for the run, and waits until nothing of it is left.
     async fn end(&mut self) {}
 

@@ -21,16 +21,16 @@ impl<L: Link, O: Operator> Engine<L, O> {
     pub(super) async fn operate(
         &mut self,
         operator: &tck_suite::model::Operator,
-        section: Section,
+        (section, calls_off): (Section, bool),
     ) -> Result<StepEnd, EngineError> {
         if !operator.each {
-            return self.operate_once(operator, section, None).await;
+            return self.operate_once(operator, (section, calls_off), None).await;
         }
         let fleet = self.recorder.judge().ground().bindings.get("fleet").cloned();
         for vehicle in fleet.iter().filter_map(Value::as_array).flatten() {
             self.bind("each", vehicle.clone())?;
             let serial = vehicle.get(SERIAL_NUMBER).and_then(Value::as_str).map(str::to_owned);
-            let end = self.operate_once(operator, section, serial).await?;
+            let end = self.operate_once(operator, (section, calls_off), serial).await?;
             if end != StepEnd::Decided {
                 return Ok(end);
             }
@@ -41,7 +41,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
     async fn operate_once(
         &mut self,
         operator: &tck_suite::model::Operator,
-        section: Section,
+        (section, calls_off): (Section, bool),
         each: Option<String>,
     ) -> Result<StepEnd, EngineError> {
         let mut parameters = Map::new();
@@ -84,6 +84,8 @@ impl<L: Link, O: Operator> Engine<L, O> {
                 operator.hook
             )),
             HookOutcome::Failed(why) => StepEnd::Broken(format!("hook `{}` failed: {why}", operator.hook)),
+            // Whoever has nothing to call off refuses with good reason; what follows shows whether that is true.
+            HookOutcome::Refused(_) if calls_off => StepEnd::Decided,
             HookOutcome::Refused(why) => StepEnd::Declined(format!(
                 "the device refuses what hook `{}` asks for: {why}",
                 operator.hook

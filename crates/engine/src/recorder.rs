@@ -96,9 +96,14 @@ impl Recorder {
         Ok(entry)
     }
 
-    /// Why the run has to end, when the device sends more than can be kept.
+    /// Why the run cannot go on as it does, when the device sends more than can be kept.
     pub fn flood(&self) -> Option<&str> {
         self.guard.over()
+    }
+
+    /// Counts anew what the device sends. `false` where that is not what takes too much.
+    pub fn begin_count_anew(&mut self) -> bool {
+        self.guard.begin_anew()
     }
 
     /// The judge of this run.

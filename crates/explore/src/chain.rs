@@ -1,10 +1,13 @@
 //! A list of stimuli that a grammar allows, one after the other.
 
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use super::grammar::Grammar;
 use super::model::Model;
 use super::writing::{self, ConversationFile};
+
+/// More stimuli than lead from the beginning to another one.
+const LONGEST_LEAD: usize = 6;
 
 /// A conversation, by the names of its stimuli.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -43,6 +46,32 @@ impl Chain {
     #[must_use]
     pub fn shortest_to(grammar: &Grammar, wanted: &str) -> Option<Self> {
         way(grammar, Model::begin(grammar), |name| name == wanted).map(|(names, _)| Self(names))
+    }
+
+    /// The shortest chain to one stimulus of every kind: of those that come from one in the grammar, one for each set of needs.
+    /// What nothing leads to within a few stimuli is missing.
+    #[must_use]
+    pub fn to_every_kind(grammar: &Grammar) -> BTreeMap<&str, Self> {
+        let kinds = grammar.kinds();
+        let mut found: BTreeMap<&str, Self> = BTreeMap::new();
+        let begin = Model::begin(grammar);
+        let mut seen = BTreeSet::from([(begin.situation.clone(), begin.facts.clone())]);
+        let mut open = VecDeque::from([(begin, Vec::new())]);
+        while let Some((model, names)) = open.pop_front() {
+            if found.len() == kinds.len() || names.len() >= LONGEST_LEAD {
+                break;
+            }
+            for (name, next) in kinds.iter().filter(|(_, next)| model.allows(next)) {
+                let longer = [names.as_slice(), &[(*name).to_owned()]].concat();
+                found.entry(*name).or_insert_with(|| Self(longer.clone()));
+                let mut after = model.clone();
+                after.hear(next, String::new());
+                if seen.insert((after.situation.clone(), after.facts.clone())) {
+                    open.push_back((after, longer));
+                }
+            }
+        }
+        found
     }
 
     /// These stimuli, those that lead to each of them, and those that lead from each of them to the next one.

@@ -62,11 +62,10 @@ impl Coverage {
         }
     }
 
-    /// Whether it was tried.
+    /// Whether it was said, and not only drawn.
     #[must_use]
     pub fn tried(&self, situation: &str, stimulus: &str) -> bool {
-        let known = self.of(situation, stimulus);
-        known.drawn > 0 || known.answers.tried() > 0
+        self.of(situation, stimulus).answers.tried() > 0
     }
 
     /// What came of each stimulus that was said, by situation.

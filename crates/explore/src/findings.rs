@@ -30,6 +30,10 @@ pub struct Finding {
     pub message: String,
     /// The conversation of its first occurrence, cut behind the stimulus that showed it.
     pub chain: Chain,
+    /// The id of the conversation of its first occurrence.
+    pub test: String,
+    /// The node on which that conversation began, where it is known.
+    pub began: Option<String>,
     /// In how many conversations it was seen.
     pub count: usize,
 }
@@ -47,7 +51,7 @@ impl Finding {
 #[must_use]
 pub fn findings(result: &RunResult, conversations: &[(Chain, ConversationFile)]) -> Vec<Finding> {
     let mut all: BTreeMap<(String, Source), Finding> = BTreeMap::new();
-    let mut note = |requirement: &str, verdict, source: Source, message: &str, chain: Chain| {
+    let mut note = |requirement: &str, verdict, source: Source, message: &str, chain: Chain, test: &str| {
         let key = (requirement.to_owned(), source.clone());
         let found = all.entry(key).or_insert_with(|| Finding {
             requirement: requirement.to_owned(),
@@ -55,11 +59,14 @@ pub fn findings(result: &RunResult, conversations: &[(Chain, ConversationFile)])
             source,
             message: message.to_owned(),
             chain: chain.clone(),
+            test: test.to_owned(),
+            began: None,
             count: 0,
         });
         found.count += 1;
         if chain.stimuli().len() < found.chain.stimuli().len() {
             found.chain = chain;
+            test.clone_into(&mut found.test);
             message.clone_into(&mut found.message);
         }
     };
@@ -81,6 +88,7 @@ pub fn findings(result: &RunResult, conversations: &[(Chain, ConversationFile)])
             Source::Stimulus(family(&chain.stimuli()[at]).to_owned()),
             &first.message,
             chain.until(at),
+            &test.id,
         );
     }
     for monitor in &result.monitors {
@@ -114,12 +122,33 @@ pub fn findings(result: &RunResult, conversations: &[(Chain, ConversationFile)])
                 Source::Monitor(monitor.id.clone()),
                 &finding.message,
                 cut,
+                &test.id,
             );
         }
     }
     let mut all: Vec<Finding> = all.into_values().collect();
     all.sort_by_key(|finding| (std::cmp::Reverse(finding.verdict), finding.requirement.clone()));
     all
+}
+
+/// The findings by what they are about: a requirement that is broken in several places is one mistake until somebody has
+/// looked. Of each, the one with the shortest conversation comes first.
+#[must_use]
+pub fn by_cause(all: Vec<Finding>) -> Vec<Vec<Finding>> {
+    let mut causes: Vec<Vec<Finding>> = Vec::new();
+    for finding in all {
+        let same = causes
+            .iter_mut()
+            .find(|cause| cause.iter().any(|one| one.requirement == finding.requirement));
+        match same {
+            Some(cause) => cause.push(finding),
+            None => causes.push(vec![finding]),
+        }
+    }
+    for cause in &mut causes {
+        cause.sort_by_key(|one| (std::cmp::Reverse(one.verdict), one.chain.stimuli().len()));
+    }
+    causes
 }
 
 /// The line of a place such as `explore/3.yaml:14`, or with a column behind it.

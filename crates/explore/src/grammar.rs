@@ -249,6 +249,24 @@ impl Grammar {
         self.stimuli.keys().filter(move |name| seen.insert(family(name)))
     }
 
+    /// One stimulus of every kind: of those that come from one in the grammar, one for each set of needs.
+    #[must_use]
+    pub fn kinds(&self) -> Vec<(&str, &Stimulus)> {
+        let mut seen = BTreeSet::new();
+        let all = self.stimuli.iter().map(|(name, stimulus)| (name.as_str(), stimulus));
+        all.filter(|&(name, stimulus)| seen.insert((family(name), &stimulus.needs)))
+            .collect()
+    }
+
+    /// Leaves out every stimulus of the kind of this one.
+    pub(super) fn leave_out(&mut self, name: &str) {
+        let Some(needs) = self.stimuli.get(name).map(|stimulus| stimulus.needs.clone()) else {
+            return;
+        };
+        self.stimuli
+            .retain(|other, stimulus| family(other) != family(name) || stimulus.needs != needs);
+    }
+
     /// The side it is for, in the word of a test.
     #[must_use]
     pub fn side(&self) -> &str {

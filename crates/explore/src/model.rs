@@ -86,6 +86,15 @@ impl Model {
         self.number += 1;
     }
 
+    /// Whether all is as it was, but for the number of stimuli.
+    pub(super) fn is_as(&self, other: &Self) -> bool {
+        let known = |model: &Self| Self {
+            number: 0,
+            ..model.clone()
+        };
+        known(self) == known(other)
+    }
+
     /// What `${now.…}` names, moved by so much.
     pub(super) fn value(&self, grammar: &Grammar, name: &str, by: u64) -> Option<String> {
         Some(match name {

@@ -5,9 +5,14 @@
     reason = "a test may fail by panicking"
 )]
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::convert::Infallible;
+use std::time::Duration;
 
-use super::{Chain, ConversationFile, Coverage, Exploration, Grammar, Source, findings, shrink};
+use super::{
+    Chain, ConversationFile, Coverage, Exploration, Finding, Grammar, Model, Purpose, Round, Source, Stage, by_cause,
+    family, findings, shrink,
+};
 use tck_judge::Library;
 use tck_pack::{Pack, Role};
 use tck_result::{Answers, ExplorationResult, SaidResult};
@@ -31,8 +36,10 @@ fn exploration(grammar: Grammar, seed: u64, conversations: usize) -> Exploration
         grammar,
         seed,
         conversations,
+        at_once: 4,
         length: 12,
         trials: 60,
+        budget: None,
     }
 }
 
@@ -53,6 +60,11 @@ fn every_stimulus_can_be_reached_and_makes_a_test_without_a_complaint() {
             .add(&places(&grammar, &files))
             .unwrap_or_else(|all| panic!("{}", all[0].render(false)));
         assert_eq!(tests.len(), grammar.stimuli.len());
+        let ways = Chain::to_every_kind(&grammar);
+        assert_eq!(ways.len(), grammar.kinds().len());
+        for (name, chain) in ways {
+            assert_eq!(chain.stimuli().len(), reach(&name.to_owned()).stimuli().len(), "{name}");
+        }
     }
 }
 
@@ -106,8 +118,19 @@ fn what_was_not_tried_yet_is_drawn_first() {
     let mut coverage = Coverage::default();
     let drawn = exploration(grammar.clone(), 1, 300).drawn(&grammar, &mut coverage);
     let (tried, of) = coverage.pairs(&grammar);
-    let stimuli: usize = drawn.iter().map(|(chain, _)| chain.stimuli().len()).sum();
-    assert!(tried * 4 >= of * 3, "{tried} of {of} pairs in {stimuli} stimuli");
+    assert_eq!(tried, 0, "what was drawn was not said yet");
+    let mut pairs = BTreeSet::new();
+    let mut stimuli = 0;
+    for (chain, _) in &drawn {
+        let mut model = Model::begin(&grammar);
+        for name in chain.stimuli() {
+            pairs.insert((model.situation.clone(), family(name).to_owned()));
+            model.hear(&grammar.stimuli[name], String::new());
+            stimuli += 1;
+        }
+    }
+    let drawn = pairs.len();
+    assert!(drawn * 4 >= of * 3, "{drawn} of {of} pairs in {stimuli} stimuli");
 }
 
 #[test]
@@ -169,7 +192,7 @@ fn what_failed_when_it_was_tried_is_drawn_less() {
 }
 
 /// What is found in conversations with the reference device of a side.
-fn found(role: Role, faults: &[&str], seed: u64, conversations: usize) -> Vec<super::Finding> {
+fn found(role: Role, faults: &[&str], seed: u64, conversations: usize) -> Vec<Finding> {
     let mut library = tck_testing::library().clone();
     let grammar = grammar(&library, library.rules.packs.latest(), role);
     let exploration = exploration(grammar.clone(), seed, conversations);
@@ -206,7 +229,7 @@ fn a_fault_is_found_where_it_shows() {
     ] {
         let all = found(role, &[fault], 1, 60);
         let source = Source::Stimulus(stimulus.to_owned());
-        let shows = |one: &super::Finding| one.requirement == requirement && one.source == source;
+        let shows = |one: &Finding| one.requirement == requirement && one.source == source;
         assert!(all.iter().any(shows), "{all:#?}");
     }
 }
@@ -251,4 +274,179 @@ fn a_grammar_that_names_what_is_not_there_is_refused_with_a_reason() {
         error.to_string(),
         "suites/explore/agv.yaml: the stimulus `one` names the situation `lost`, which there is not"
     );
+}
+
+/// The built-in vehicle in virtual time, of whose conversations every one takes a minute.
+struct OnTheMinute {
+    library: Library,
+    change: Box<dyn Fn(&mut VirtualRun)>,
+    spent: Duration,
+    rounds: Vec<(Purpose, Vec<ConversationFile>)>,
+}
+
+impl OnTheMinute {
+    fn new(change: impl Fn(&mut VirtualRun) + 'static) -> Self {
+        Self {
+            library: tck_testing::library().clone(),
+            change: Box::new(change),
+            spent: Duration::ZERO,
+            rounds: Vec::new(),
+        }
+    }
+
+    fn told(&self, purpose: Purpose) -> Vec<&ConversationFile> {
+        let rounds = self.rounds.iter().filter(|(of, _)| *of == purpose);
+        rounds.flat_map(|(_, files)| files).collect()
+    }
+}
+
+impl Stage for OnTheMinute {
+    type Error = String;
+
+    fn carry_out(
+        &mut self,
+        files: &[ConversationFile],
+        purpose: Purpose,
+        within: Option<Duration>,
+    ) -> Result<Round, String> {
+        const EACH: Duration = Duration::from_secs(60);
+        let mut library = self.library.clone();
+        let places = files.iter().map(|file| (file.place("agv"), file.text.clone()));
+        let tests = library
+            .add(&places.collect::<Vec<_>>())
+            .map_err(|all| all[0].render(false))?;
+        let room = within.map_or(files.len(), |within| {
+            usize::try_from(within.as_secs().div_ceil(EACH.as_secs())).expect("a few")
+        });
+        let pack = library.rules.packs.latest().clone();
+        let mut run = VirtualRun::of_role(Role::Agv, &library, &pack);
+        run.tests = Selection::some(tests);
+        run.draw = None;
+        run.budget = (purpose == Purpose::Gates).then_some(Duration::ZERO);
+        (self.change)(&mut run);
+        if purpose != Purpose::Gates {
+            let told: BTreeSet<&str> = files.iter().take(room).map(|file| file.id.as_str()).collect();
+            run.tests.retain(|test| told.contains(test.id.as_str()));
+            self.spent += EACH * u32::try_from(told.len()).expect("a few");
+        }
+        let told: Vec<ConversationFile> = files.iter().take(room).cloned().collect();
+        self.rounds.push((purpose, told));
+        let finished = run_silently(&library, &pack, run).map_err(|error| error.to_string())?;
+        Ok(Round {
+            result: finished.result,
+            began: BTreeMap::new(),
+        })
+    }
+
+    fn spent(&self) -> Duration {
+        self.spent
+    }
+}
+
+#[test]
+fn what_the_device_has_not_is_never_drawn_and_never_said() {
+    let library = tck_testing::library();
+    let grammar = grammar(library, library.rules.packs.latest(), Role::Agv);
+    let mut stage = OnTheMinute::new(|run| run.motion = Err(tck_journal::Reason::MotionRuledOut));
+    let explored = exploration(grammar, 1, 8)
+        .carry_out(&mut stage, &mut |_| {})
+        .expect("an exploration");
+    let names: BTreeSet<&str> = explored.left_out.iter().map(|(name, _)| name.as_str()).collect();
+    assert!(
+        names.contains("order-next") && names.contains("order-open"),
+        "{names:?}"
+    );
+    assert_eq!((explored.conversations, explored.undecided.0), (8, 0), "{explored:?}");
+    assert!(explored.findings.is_empty() && explored.remarks.is_empty());
+    for file in [stage.told(Purpose::Probe), stage.told(Purpose::Conversations)].concat() {
+        assert!(!file.text.contains("moves: true"), "{}", file.text);
+    }
+    let said = stage.told(Purpose::Conversations).len();
+    assert_eq!(said, 8, "every conversation that was drawn was held");
+}
+
+#[test]
+fn the_budget_covers_all_and_what_it_leaves_out_differs_by_the_seed() {
+    let library = tck_testing::library();
+    let grammar = grammar(library, library.rules.packs.latest(), Role::Agv);
+    let budget = Duration::from_secs(60 * 60);
+    let probed = |seed| {
+        let mut stage = OnTheMinute::new(|run| run.faults = vec!["outdated-update-taken-over".to_owned()]);
+        let exploration = Exploration {
+            budget: Some(budget),
+            ..exploration(grammar.clone(), seed, 400)
+        };
+        let explored = exploration.carry_out(&mut stage, &mut |_| {}).expect("an exploration");
+        assert!(stage.spent <= budget + Duration::from_secs(60), "{:?}", stage.spent);
+        assert!(explored.conversations >= 15, "{}", explored.conversations);
+        let told = stage.told(Purpose::Probe);
+        assert!((10..=20).contains(&told.len()), "{}", told.len());
+        told.iter().map(|file| file.id.clone()).collect::<BTreeSet<_>>()
+    };
+    assert_ne!(probed(1), probed(2));
+}
+
+#[test]
+fn what_does_not_show_again_is_a_remark_and_fails_nothing() {
+    let chain = Chain::of(
+        &grammar(
+            tck_testing::library(),
+            tck_testing::library().rules.packs.latest(),
+            Role::Agv,
+        ),
+        &["order-open".to_owned()],
+    )
+    .expect("the grammar allows it");
+    let finding = |requirement: &str, stimulus: &str, count| Finding {
+        requirement: requirement.to_owned(),
+        verdict: tck_base::verdict::Verdict::Fail,
+        source: Source::Stimulus(stimulus.to_owned()),
+        message: String::new(),
+        chain: chain.clone(),
+        test: "explore/seed-1-1".to_owned(),
+        began: None,
+        count,
+    };
+    let grammar = grammar(
+        tck_testing::library(),
+        tck_testing::library().rules.packs.latest(),
+        Role::Agv,
+    );
+    let shown = |count, shows| super::Shown {
+        finding: finding("ORD-04", "order-open", count),
+        others: Vec::new(),
+        file: chain.file(&grammar, "explore/one", "Why."),
+        shows,
+    };
+    for (count, shows, fails) in [
+        (1, (0, 3), false),
+        (5, (0, 3), false),
+        (1, (1, 3), true),
+        (1, (0, 0), false),
+        (2, (0, 0), true),
+    ] {
+        assert_eq!(shown(count, shows).fails(), fails, "{count} {shows:?}");
+    }
+    let causes = by_cause(vec![
+        finding("ORD-04", "order-open", 1),
+        finding("ORD-06", "order-next", 1),
+        finding("ORD-04", "order-next", 1),
+    ]);
+    assert_eq!(causes.iter().map(Vec::len).collect::<Vec<_>>(), [2, 1]);
+}
+
+#[test]
+fn a_conversation_that_begins_elsewhere_is_the_same_test_a_line_further_down() {
+    let library = tck_testing::library();
+    let grammar = grammar(library, library.rules.packs.latest(), Role::Agv);
+    let chain = Chain::of(&grammar, &["order-open".to_owned()]).expect("the grammar allows it");
+    let file = chain.file(&grammar, "explore/here", "Why.");
+    let there = chain.file(&grammar, "explore/here", "Why.").beginning_on("n3");
+    let first = |file: &ConversationFile| (1..500).find(|line| file.stimulus_at(*line).is_some());
+    assert_eq!(first(&there), first(&file).map(|line| line + 1));
+    let mut library = library.clone();
+    let tests = library
+        .add(&places(&grammar, &[there]))
+        .unwrap_or_else(|all| panic!("{}", all[0].render(false)));
+    assert_eq!(tests[0].begins.as_deref(), Some("n3"));
 }

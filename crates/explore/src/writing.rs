@@ -36,6 +36,22 @@ impl ConversationFile {
         Some(Self::new(id, text, 0, Vec::new()))
     }
 
+    /// Has the conversation begin on this node.
+    #[must_use]
+    pub fn beginning_on(mut self, node: &str) -> Self {
+        const HEAD: &str = "\ngiven:\n";
+        // What the device says of itself goes into no test as it is.
+        let is_plain = |one: char| !one.is_control() && one != '"' && one != '\\';
+        if let Some(at) = self.text.find(HEAD).filter(|_| node.chars().all(is_plain)) {
+            self.text.insert_str(at, &format!("begins: \"{node}\"\n"));
+            self.first += 1;
+            for end in &mut self.ends {
+                *end += 1;
+            }
+        }
+        self
+    }
+
     /// Where it stands as a test of a side.
     #[must_use]
     pub fn place(&self, side: &str) -> String {
@@ -80,14 +96,16 @@ pub(super) fn file(stimuli: &[String], grammar: &Grammar, id: &str, why: &str) -
         let broken = stimulus.broken.as_ref().map_or_else(String::new, |broken| {
             format!(", member: \"{}\", way: \"{}\"", broken.member, broken.way)
         });
+        let before = model.clone();
+        let steps = steps(&sent) + steps(&heard);
+        model.hear(stimulus, sent);
+        let stays = if before.is_as(&model) { ", stays: true" } else { "" };
         let _ = writeln!(
             said,
-            "  - {{ in: {}, say: {}{broken}, steps: {} }}",
-            model.situation,
+            "  - {{ in: {}, say: {}{broken}, steps: {steps}{stays} }}",
+            before.situation,
             family(name),
-            steps(&sent) + steps(&heard)
         );
-        model.hear(stimulus, sent);
     }
     let mut text = String::new();
     let _ = writeln!(text, "test: {id}");

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use tck_base::verdict::Verdict;
 use tck_pack::Role;
 use tck_result::{Answers, Decision, ExplorationResult, MemberResult, SaidResult, StepResult, TestResult};
-use tck_suite::model::{ConversationPart, Test};
+use tck_suite::model::{ConversationPart, Test, place_in_body};
 
 /// What came of one stimulus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,7 +77,7 @@ fn answers<'a>(conversation: &'a [ConversationPart], result: &TestResult) -> Vec
     for one in conversation {
         let own = first..first + one.steps;
         first = own.end;
-        let is_own = |path: &str| index(path).is_some_and(|at| own.contains(&at));
+        let is_own = |path: &str| place_in_body(path).is_some_and(|at| own.contains(&at));
         let decisions = result.decisions.iter().filter(|one| is_own(&one.clause));
         let verdicts: Vec<Verdict> = decisions.map(Decision::verdict).collect();
         let mut steps = result.steps.iter().filter(|step| is_own(&step.path)).peekable();
@@ -96,16 +96,12 @@ fn answers<'a>(conversation: &'a [ConversationPart], result: &TestResult) -> Vec
             Answer::Undecided
         };
         all.push((one, answer));
-        if answer != Answer::AsDemanded {
+        let is_over = answer == Answer::Broken || (answer == Answer::Undecided && !one.stays);
+        if is_over {
             break;
         }
     }
     all
-}
-
-/// The place in the body that a path such as `steps[6].assert` begins with.
-fn index(path: &str) -> Option<usize> {
-    path.strip_prefix("steps[")?.split_once(']')?.0.parse().ok()
 }
 
 #[cfg(test)]
@@ -118,6 +114,7 @@ mod tests {
             stimulus: stimulus.to_owned(),
             broken: None,
             steps,
+            stays: false,
         }
     }
 
@@ -187,6 +184,23 @@ mod tests {
             words(&conversation, &broken_off),
             [("order".to_owned(), Answer::Undecided)]
         );
+    }
+
+    #[test]
+    fn a_refused_stimulus_that_changes_nothing_does_not_end_the_conversation() {
+        let mut conversation = [said("cancel", 2), said("ask", 1)];
+        conversation[0].stays = true;
+        let steps = vec![
+            step(0, "failed"),
+            step(1, StepResult::NOT_RUN),
+            step(2, StepResult::DONE),
+        ];
+        let refused = result(steps, &[(2, Verdict::Pass)]);
+        let expected = [
+            ("cancel".to_owned(), Answer::Undecided),
+            ("ask".to_owned(), Answer::AsDemanded),
+        ];
+        assert_eq!(words(&conversation, &refused), expected);
     }
 
     #[test]

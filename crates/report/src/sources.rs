@@ -254,6 +254,7 @@ mod tests {
             moves: false,
             tags: Vec::new(),
             conversation: Vec::new(),
+            begins: None,
             maturity: Maturity::Open,
             why: "because".to_owned(),
             given: Vec::new(),

@@ -6,7 +6,7 @@ use serde_json::{Map, Value};
 
 use super::idle::Home;
 use super::pace::{Pace, between_looks};
-use tck_course::{Layout, Standing};
+use tck_course::{Course, Edge, Layout, Node, Standing};
 use tck_engine::IdForm;
 use tck_journal::Reason;
 use tck_journal::event::{Event, Packet};
@@ -31,6 +31,37 @@ pub(super) fn standing(judge: &RunJudge, layout: &Layout, home: &Home) -> Option
         x: position.x.float()?,
         y: position.y.float()?,
     })
+}
+
+/// Why a conversation about a station does not begin on it.
+const COLLAPSES: &str = "the vehicle stands on a station that this is about, so the way there is none";
+
+/// The way, edge by edge, that the vehicle has to drive before a test; `None` where the test fits as it stands, or nowhere.
+pub(super) fn way_to_fit(test: &Test, layout: &Layout, judge: &RunJudge, home: &Home) -> Option<Vec<Edge>> {
+    if test.course.nodes.is_empty() && test.begins.is_none() {
+        return None;
+    }
+    let directed;
+    let layout = if test.course.directed {
+        directed = layout.clone().directed();
+        &directed
+    } else {
+        layout
+    };
+    let standing = standing(judge, layout, home)?;
+    let here = layout.standing(&standing).ok()?;
+    let fits = |node: &Node, course: &Course| {
+        let collapses = !test.conversation.is_empty() && course.collapses();
+        !collapses && test.begins.as_ref().is_none_or(|begins| *begins == node.id)
+    };
+    if layout
+        .assign(&test.course, &standing)
+        .is_ok_and(|course| fits(here, &course))
+    {
+        return None;
+    }
+    let way = layout.way_to_fit(&test.course, &standing, fits)?;
+    Some(way.into_iter().cloned().collect())
 }
 
 /// The course of a test; `Err` says why there is none.
@@ -60,6 +91,9 @@ pub(super) fn course_of(
         layout.assign(&test.course, &standing)
     };
     let course = course.map_err(|error| Reason::observed(error.to_string()))?;
+    if !test.conversation.is_empty() && course.collapses() {
+        return Err(Reason::observed(COLLAPSES));
+    }
     let mut course = course.bindings();
     Pace::of(judge.ground().factsheet().as_deref()).set(&mut course);
     Ok(Some(flat(course)))

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use serde_json::Map;
 
 use super::session::Session;
-use tck_course::Node;
+use tck_course::{Node, Standing};
 use tck_engine::vehicle::is_idle;
 use tck_engine::{EngineError, Operator, Recorder};
 use tck_journal::event::Event;
@@ -80,6 +80,19 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
     /// one.
     pub(super) async fn bring_back(&mut self) -> Result<(), EngineError> {
         self.engine.set_vehicle(0, "reset", Fleet::reset(None)).await?;
+        self.be_seen().await
+    }
+
+    /// Puts the first vehicle on a node from where a test fits, if there is one.
+    pub(super) async fn put_to_fit(&mut self, test: &Test) -> Result<(), EngineError> {
+        let nodes = self.setup.layout.iter().flat_map(|layout| {
+            let all = layout.nodes().filter(|node| !node.station);
+            all.filter(move |node| layout.outward(&test.course, &Standing::Node(node.id.clone())).is_ok())
+        });
+        let Some(node) = nodes.map(|node| node.id.clone()).next() else {
+            return Ok(());
+        };
+        self.engine.set_vehicle(0, "reset", Fleet::reset(Some(&node))).await?;
         self.be_seen().await
     }
 

@@ -165,6 +165,17 @@ impl Operator for ProfileHooks {
         (hook.action == HookAction::NaturalTraffic).then_some(hook.timeout)
     }
 
+    fn has_program(&self) -> bool {
+        self.device.is_some()
+    }
+
+    async fn start_program_again(&mut self) -> Result<(), String> {
+        match &mut self.device {
+            Some(device) => device.restart().await.map_err(|error| error.to_string()),
+            None => Err("the profile has no `device.command` that could be started".to_owned()),
+        }
+    }
+
     async fn end(&mut self) {
         if let Some(device) = &mut self.device {
             device.stop("the end of the run").await;

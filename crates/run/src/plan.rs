@@ -133,7 +133,7 @@ impl RunPlan {
         (known, vocabulary): (&BTreeMap<String, How>, &Hooks),
     ) -> Self {
         if subject.role == Role::Agv {
-            by_risk(&mut setup.tests, vocabulary);
+            by_risk(&mut setup.tests, vocabulary, true);
         }
         let gate = |test: &Test| gate(&setup, test);
         let may_run = |test: &Test| matches!(gate(test).0, Waits::Runs | Waits::DependsOnDevice);

@@ -2,16 +2,19 @@
 
 use serde_json::{Value, json};
 
+use super::bindings::way_to_fit;
 use super::idle::Obstacle;
 use super::lasting::{self, Idle, has_ended, is_stalled, lasting};
 use super::reset::power_cycle;
 use super::session::Session;
 use tck_base::clock::Moment;
+use tck_course::{Edge, Layout};
 use tck_engine::{EngineError, Operator};
 use tck_journal::event::Event;
 use tck_judge::RunJudge;
 use tck_net::link::Link;
 use tck_pack::HookEffect;
+use tck_suite::model::Test;
 
 /// Whether no state has named the last order that was sent since then, although states came.
 fn last_order_never_showed(judge: &RunJudge, since: Moment) -> bool {
@@ -27,6 +30,39 @@ fn last_order_never_showed(judge: &RunJudge, since: Moment) -> bool {
             shown.is_none_or(|state| !state.order_id.is(order))
         })
 }
+
+/// The nodes and edges of an order over this way; `None` where a node of it is not in the layout.
+fn order_over(layout: &Layout, way: &[Edge]) -> Option<(Value, Value)> {
+    let ids = way.first().map(|edge| &edge.start).into_iter();
+    let ids = ids.chain(way.iter().map(|edge| &edge.end)).enumerate();
+    let nodes = ids.map(|(at, id)| {
+        let node = layout.node(id)?;
+        Some(json!({
+            "nodeId": id, "sequenceId": 2 * at, "released": true, "actions": [],
+            "nodePosition": { "x": node.x, "y": node.y, "mapId": node.map_id },
+        }))
+    });
+    let edges = way.iter().enumerate().map(|(at, edge)| {
+        let mut sent = json!({
+            "edgeId": edge.id, "sequenceId": 2 * at + 1, "released": true, "actions": [],
+            "startNodeId": edge.start, "endNodeId": edge.end,
+        });
+        let known = edge.value();
+        for member in ["maxSpeed", "direction"] {
+            if let Some(value) = known.get(member) {
+                sent[member] = value.clone();
+            }
+        }
+        sent
+    });
+    Some((
+        nodes.collect::<Option<Vec<_>>>()?.into(),
+        edges.collect::<Vec<_>>().into(),
+    ))
+}
+
+/// How often a device is restarted that floods the harness.
+const MOST_FLOODS: u32 = 3;
 
 /// How often in a row the whole ladder is tried before only a moment is given.
 const WHOLE_LADDERS: u32 = 3;
@@ -56,9 +92,34 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         Ok(())
     }
 
-    /// Whether the device can be switched off and on.
-    fn can_restart(&self) -> bool {
-        self.engine.hook_that(HookEffect::PowerCycles).is_some()
+    /// Whether the device can be switched off and on, or the program be started again that it is.
+    pub(super) fn can_restart(&self) -> bool {
+        self.engine.hook_that(HookEffect::PowerCycles).is_some() || self.engine.operator.has_program()
+    }
+
+    /// Starts a device again that floods the harness, where that is possible: it has ended the test, and need not end the
+    /// run.
+    pub(super) async fn outlast_flood(&mut self, test: &Test) -> Result<(), EngineError> {
+        let Some(why) = self.engine.recorder.flood().map(str::to_owned) else {
+            return Ok(());
+        };
+        if self.floods >= MOST_FLOODS || !self.can_restart() {
+            return Ok(());
+        }
+        self.floods += 1;
+        for _ in 0..2 {
+            // Else nothing more would be sent, and nothing waited for.
+            if !self.engine.recorder.begin_count_anew() {
+                break;
+            }
+            let restarted = power_cycle(self, format!("{why}; it is restarted")).await?;
+            if restarted.is_ok() {
+                let limit = format!("In test {} {why}. It was restarted, and the run went on.", test.id);
+                self.setup.limits.push(limit);
+                break;
+            }
+        }
+        Ok(())
     }
 
     /// Brings the vehicle to rest, and gives what is still in the way.
@@ -248,6 +309,39 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         Ok(())
     }
 
+    /// Has a vehicle at rest driven to where a test fits, if the test does not fit where it stands.
+    pub(super) async fn drive_to_fit(&mut self, test: &Test) -> Result<(), EngineError> {
+        let may = self.setup.capabilities.motion.is_ok() && self.halted.is_none() && !self.engine.interrupted();
+        let Some(layout) = self.setup.layout.as_ref().filter(|_| may) else {
+            return Ok(());
+        };
+        let Some(way) = way_to_fit(test, layout, self.engine.recorder.judge(), &self.home) else {
+            return Ok(());
+        };
+        let Some(end) = way.last().map(|edge| edge.end.clone()) else {
+            return Ok(());
+        };
+        let Some((nodes, edges)) = order_over(layout, &way) else {
+            return Ok(());
+        };
+        let text = format!("the vehicle is driven to node {end:?}, from where {} fits", test.id);
+        self.progress.note(&text);
+        self.engine.note(Event::Note { text })?;
+        self.order(nodes, edges).await?;
+        let edges = u32::try_from(way.len()).unwrap_or(u32::MAX);
+        let until = self.engine.link.now().moment + self.time("drive") * edges;
+        let (home, layout) = (&self.home, self.setup.layout.as_ref());
+        let is_there = |recorder: &tck_engine::Recorder| {
+            let state = recorder.judge().state();
+            state.is_some_and(|state| state.last_node_id.is(&end))
+                && home.obstacles(recorder.judge(), layout).is_empty()
+        };
+        if !self.engine.watch(until, is_there).await? {
+            self.bring_to_rest().await?;
+        }
+        Ok(())
+    }
+
     /// A vehicle that looks idle and refuses everything is of no use to the next test. It is asked when the last order
     /// of a test never showed, and from the first time it was found so after every test.
     pub(super) async fn still_takes_orders(&mut self) -> Result<(), EngineError> {
@@ -334,7 +428,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
 
     /// Off and on again, and whatever it shows then although it stands idle is read over.
     pub(super) async fn restart(&mut self) -> Result<bool, EngineError> {
-        self.rung("hook `power-cycle`")?;
+        self.rung("a restart")?;
         let all: Vec<String> = self.obstacles().iter().map(Obstacle::describe).collect();
         let why = match all.is_empty() {
             true => "the device is restarted".to_owned(),

@@ -32,14 +32,13 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         Ok(())
     }
 
-    /// Waits for a device that is gone, with the help of the hook that switches it off and on if there is one. Gives the
-    /// reason when it stays away.
+    /// Waits for a device that is gone, and starts it again if that is possible. Gives the reason when it stays away.
     pub(super) async fn revive(&mut self) -> Result<Option<String>, EngineError> {
         let vantage = self.setup.capabilities.vantage;
         let there = move |recorder: &Recorder| Presence::of(recorder.judge(), vantage).is_there();
-        let has_hook = self.engine.hook_that(HookEffect::PowerCycles).is_some();
+        let can_restart = self.can_restart();
         // A device that comes back by itself is given the chance before it is switched off and on.
-        let first = if has_hook {
+        let first = if can_restart {
             self.time("settle")
         } else {
             self.time("reconnect")
@@ -59,7 +58,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
                 left.map_or_else(String::new, |left| format!("; {left}"))
             ),
         };
-        if !has_hook {
+        if !can_restart {
             return Ok(Some(why));
         }
         let sent = last_sent(&self.engine.recorder);
@@ -126,19 +125,24 @@ pub(super) async fn power_cycle<L: Link, O: Operator>(
 async fn off_and_on<L: Link, O: Operator>(session: &mut Session<'_, L, O>) -> Result<Result<(), String>, EngineError> {
     let vantage = session.setup.capabilities.vantage;
     let before = next_seq(&session.engine.recorder);
-    let Some(hook) = session.engine.hook_that(HookEffect::PowerCycles) else {
-        return Ok(Err("there is no hook that switches it off and on".to_owned()));
+    let by = match session.engine.hook_that(HookEffect::PowerCycles) {
+        Some(hook) => match session.engine.hook(&hook, Map::new(), true).await? {
+            HookOutcome::Done(_) => format!("hook `{hook}`"),
+            HookOutcome::Failed(failed)
+            | HookOutcome::Refused(failed)
+            | HookOutcome::Skipped(failed)
+            | HookOutcome::Unanswered(failed) => {
+                return Ok(Err(format!("hook `{hook}` failed: {failed}")));
+            }
+            HookOutcome::Missing => return Ok(Err(format!("there is no hook `{hook}`"))),
+        },
+        None => match session.engine.operator.start_program_again().await {
+            Ok(()) => "`device.command`".to_owned(),
+            Err(failed) => return Ok(Err(failed)),
+        },
     };
-    match session.engine.hook(&hook, Map::new(), true).await? {
-        HookOutcome::Done(_) => {}
-        HookOutcome::Failed(failed)
-        | HookOutcome::Refused(failed)
-        | HookOutcome::Skipped(failed)
-        | HookOutcome::Unanswered(failed) => {
-            return Ok(Err(format!("hook `{hook}` failed: {failed}")));
-        }
-        HookOutcome::Missing => return Ok(Err(format!("there is no hook `{hook}`"))),
-    }
+    // What came until then counts no more: a device that floods the harness may be another one now.
+    session.engine.recorder.begin_count_anew();
     let after = next_seq(&session.engine.recorder);
     let on_again = move |recorder: &Recorder| match vantage {
         // What the device still said before it was switched off is not what it says now that it is on again.
@@ -164,7 +168,7 @@ async fn off_and_on<L: Link, O: Operator>(session: &mut Session<'_, L, O>) -> Re
     let is_over = |recorder: &Recorder| is_down(recorder) || back(recorder);
     let came = session.engine.watch(begun + patience, is_over).await?;
     if let Some(why) = session.program_is_down() {
-        return Ok(Err(format!("after hook `{hook}` {why}")));
+        return Ok(Err(format!("after {by} {why}")));
     }
     if came {
         return Ok(Ok(()));
@@ -184,10 +188,7 @@ async fn off_and_on<L: Link, O: Operator>(session: &mut Session<'_, L, O>) -> Re
     } else {
         "it did not come back"
     };
-    Ok(Err(format!(
-        "{missing} within {} after hook `{hook}`",
-        show_duration(waited)
-    )))
+    Ok(Err(format!("{missing} within {} after {by}", show_duration(waited))))
 }
 
 fn next_seq(recorder: &Recorder) -> u64 {

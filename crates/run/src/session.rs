@@ -14,7 +14,7 @@ use super::estimate::Outlook;
 use super::idle::{Home, Obstacle};
 use super::precondition_breaker::PreconditionBreaker;
 use super::presence::{Presence, gone};
-use super::risk::by_risk;
+use super::risk::{FailingTables, by_risk};
 use super::sheet::Sheet;
 use tck_base::verdict::Verdict;
 use tck_course::Layout;
@@ -24,7 +24,7 @@ use tck_journal::event::{Event, Gate, Plan, PlannedTest};
 use tck_judge::RunJudge;
 use tck_net::link::Link;
 use tck_net::link::mqtt::BenchInfo;
-use tck_pack::{HookEffect, Role};
+use tck_pack::Role;
 use tck_result::{RunResult, TestResult};
 use tck_suite::model::Test;
 
@@ -210,6 +210,8 @@ pub(super) struct Session<'a, L, O> {
     pub(super) cancelled: Option<String>,
     /// The vehicle was found to refuse every order, until it was restarted.
     pub(super) refuses: bool,
+    /// How often it was restarted because it flooded the harness.
+    pub(super) floods: u32,
     /// How often in a row a restart did not make it take orders again.
     pub(super) unhelped: u32,
     /// How many orders were sent on that way.
@@ -230,7 +232,8 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
     fn new(engine: &'a mut Engine<L, O>, mut setup: Setup, progress: &'a mut dyn Progress) -> Self {
         let ground = engine.recorder.judge().ground();
         if ground.role == Role::Agv {
-            by_risk(&mut setup.tests, &ground.hooks);
+            let somebody_waits = !engine.operator.runs_on_the_link();
+            by_risk(&mut setup.tests, &ground.hooks, somebody_waits);
         }
         Self {
             engine,
@@ -242,6 +245,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             cancelled: None,
             refuses: false,
             unhelped: 0,
+            floods: 0,
             orders: 0,
             ready_since: 0,
             strikes: PreconditionBreaker::default(),
@@ -286,6 +290,9 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         let mut gone: Option<String> = None;
         let mut failed: Option<String> = None;
         let mut without_time = 0;
+        // In virtual time nobody does.
+        let somebody_waits = !self.engine.operator.runs_on_the_link();
+        let mut failing = FailingTables::default();
         // What nobody answered is asked again when all else is done.
         let mut queue: VecDeque<(usize, bool)> = (0..tests.len()).map(|at| (at, false)).collect();
         while let Some((at, again)) = queue.pop_front() {
@@ -325,6 +332,9 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
                 if gone.is_none() && test.device == Role::MasterControl {
                     self.let_it_finish().await?;
                 }
+                if gone.is_none() && test.device == Role::Agv {
+                    self.drive_to_fit(test).await?;
+                }
                 let aside = gone.clone().map(Reason::observed);
                 let aside = aside.or_else(|| self.strikes.against(test));
                 let ready = match (&aside, &self.halted) {
@@ -335,7 +345,13 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
                 let ready = match ready {
                     Err(_) if gone.is_none() && test.device == Role::MasterControl => {
                         self.bring_back().await?;
-                        self.bindings(test, number)
+                        match self.bindings(test, number) {
+                            Err(_) => {
+                                self.put_to_fit(test).await?;
+                                self.bindings(test, number)
+                            }
+                            ready => ready,
+                        }
                     }
                     ready => ready,
                 };
@@ -354,8 +370,13 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
                         gone = self.run_and_restore(test, own, number).await?;
                         if let Some(result) = self.engine.recorder.judge().done().last() {
                             self.progress.test_ended(result);
-                            if self.setup.fail_fast && result.verdict == Some(Verdict::Fail) {
+                            let fails = result.verdict == Some(Verdict::Fail);
+                            if self.setup.fail_fast && fails {
                                 failed = Some(result.id.clone());
+                            }
+                            if fails && somebody_waits && failing.failed(test, &tests, &mut queue) {
+                                self.progress
+                                    .note("the tests like this one come at the end: three of them have failed");
                             }
                             // What was decided before the question stands, and is not taken back by another try.
                             let mut decisions = result.decisions.iter();
@@ -405,7 +426,11 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
 
     /// How the run ended before its time, if it did.
     fn stopped(&self) -> Option<End> {
-        let flooded = self.engine.recorder.flood().map(|why| End::Flooded(why.to_owned()));
+        let flooded = self.engine.recorder.flood().map(|why| {
+            End::Flooded(format!(
+                "{why}; the run was ended before this machine runs out of memory, and what was found until then stands"
+            ))
+        });
         flooded.or(self.engine.interrupted().then_some(End::Interrupted))
     }
 
@@ -468,6 +493,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         self.engine
             .run_test(test, own, &mut AsWatcher(&mut *self.progress))
             .await?;
+        self.outlast_flood(test).await?;
         self.after(test).await?;
         if test.device == Role::MasterControl {
             return Ok(None);
@@ -481,8 +507,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         }
         let learned = self.engine.recorder.judge().ground().waivers.len() > known;
         if !learned && self.strikes.is_worth_a_restart(&place) {
-            let has_hook = self.engine.hook_that(HookEffect::PowerCycles).is_some();
-            if !has_hook || !self.restart().await? {
+            if !self.can_restart() || !self.restart().await? {
                 self.strikes.missed(test, &place);
                 return Ok(None);
             }
@@ -493,6 +518,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         if let Some(why) = self.be_there().await? {
             return Ok(Some(why));
         }
+        self.drive_to_fit(test).await?;
         // What it sends may stand elsewhere now, and goes by names of its own.
         if let Ok(own) = self.bindings(test, number + TRIED_AGAIN) {
             self.progress
@@ -501,6 +527,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             self.engine
                 .run_test(test, own, &mut AsWatcher(&mut *self.progress))
                 .await?;
+            self.outlast_flood(test).await?;
             self.after(test).await?;
         }
         match self.unreached(test) {

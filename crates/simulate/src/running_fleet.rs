@@ -75,6 +75,14 @@ impl<O: Operator> Operator for WithFleet<O> {
         self.operator.natural_traffic(hook)
     }
 
+    fn has_program(&self) -> bool {
+        self.operator.has_program()
+    }
+
+    async fn start_program_again(&mut self) -> Result<(), String> {
+        self.operator.start_program_again().await
+    }
+
     async fn end(&mut self) {
         self.operator.end().await;
     }

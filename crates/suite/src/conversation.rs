@@ -15,7 +15,7 @@ pub(super) fn conversation(fields: &Fields<'_>, body: usize, problems: &mut Prob
         let Some(said) = Fields::of(node, problems) else {
             continue;
         };
-        said.only(&[&["in", "say", "member", "way", "steps"]], problems);
+        said.only(&[&["in", "say", "member", "way", "steps", "stays"]], problems);
         let member = said.text("member", problems).map(str::to_owned);
         let way = said.text("way", problems).map(str::to_owned);
         if member.is_some() != way.is_some() {
@@ -38,6 +38,7 @@ pub(super) fn conversation(fields: &Fields<'_>, body: usize, problems: &mut Prob
             stimulus: stimulus.to_owned(),
             broken: member.zip(way).map(|(member, way)| BrokenMember { member, way }),
             steps: usize::try_from(steps).unwrap_or_default(),
+            stays: said.flag("stays", problems),
         });
     }
     let steps: usize = all.iter().map(|said| said.steps).sum();

@@ -248,6 +248,7 @@ fn lint_state(
         moves: true,
         tags: Vec::new(),
         conversation: Vec::new(),
+        begins: None,
         maturity: Maturity::Open,
         why: String::new(),
         given,

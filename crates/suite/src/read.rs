@@ -33,6 +33,7 @@ const TEST_KEYS: &[&str] = &[
     "watchlist",
     "tags",
     "conversation",
+    "begins",
     "why",
     "cases",
     "given",
@@ -379,6 +380,7 @@ impl TestReader<'_> {
             problems.at("empty-steps", &node.span, "a test without steps", "decides nothing");
         }
         let conversation = conversation(&fields, steps.len(), problems);
+        let begins = fields.text("begins", problems).map(str::to_owned);
         let id = fields.text("test", &mut Problems::default())?.to_owned();
         let group = id.split('/').next().unwrap_or_default().to_owned();
         let (needs, need_places): (Vec<_>, Vec<_>) = header.needs.into_iter().unzip();
@@ -400,6 +402,7 @@ impl TestReader<'_> {
             moves,
             tags,
             conversation,
+            begins,
             maturity,
             why: header.why,
             given,

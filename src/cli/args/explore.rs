@@ -30,13 +30,13 @@ pub struct Explore {
     /// Which suites, and with them which grammar.
     #[command(flatten)]
     pub suites: SuiteArgs,
-    /// Begin the random choice here; another number draws other conversations
-    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
-    pub seed: u64,
+    /// Begin the random choice here; 1 for the built-in device, and another one in every exploration of yours
+    #[arg(long, value_name = "NUMBER")]
+    pub seed: Option<u64>,
     /// Draw at most so many conversations
     #[arg(long, value_name = "NUMBER", default_value_t = 40)]
     pub conversations: usize,
-    /// Begin no conversation after this time, such as 20m or 2h; what was found until then is still made shorter
+    /// End after this time, such as 20m or 2h: trying stimuli, holding conversations, making what fails shorter
     #[arg(long, value_name = "TIME", value_parser = super::watch::time)]
     pub budget: Option<Duration>,
     /// Say at most so much in one of them

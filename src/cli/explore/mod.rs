@@ -15,11 +15,17 @@ use super::reference::{self, Asked};
 use stage::{Device, OnStage};
 use tck_base::diagnostic::Diagnostic;
 use tck_base::verdict::Verdict;
-use tck_explore::{Chain, ConversationFile, Exploration, Grammar, Purpose, Stage as _};
+use tck_explore::{Chain, ConversationFile, Exploration, Grammar, Purpose, Shown, Stage as _};
 use tck_profile::{self as profile, Surroundings};
 
 /// How much more often a stimulus is drawn on which the exploration is focused.
 const FOCUS: u32 = 20;
+
+/// In how many rounds conversations are held at most, each of which has a report.
+const MOST_ROUNDS: usize = 10;
+
+/// How many conversations a round has at least.
+const AT_ONCE: usize = 4;
 
 /// `explore`.
 pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
@@ -45,18 +51,23 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
         super::print(&show::stimuli(&grammar))?;
         return Ok(Exit::Conforms);
     }
+    let device = Device::of(arguments, &effective, &pack, &surroundings)?;
     let exploration = Exploration {
         grammar,
-        seed: arguments.seed,
+        seed: arguments.seed.unwrap_or_else(|| device.usual_seed()),
         conversations: arguments.conversations,
+        at_once: arguments
+            .conversations
+            .div_ceil(MOST_ROUNDS)
+            .clamp(AT_ONCE, device.most_at_once()),
         length: arguments.length,
         trials: arguments.shrink_budget,
+        budget: arguments.budget,
     };
     if let Some(every) = arguments.every_fault {
         return measure::every_fault(library, &pack, &exploration, every.max(1), arguments);
     }
-    let device = Device::of(arguments, &effective, &pack, &surroundings)?;
-    let mut stage = OnStage::new(library, pack, device, &arguments.output.out)?.within(arguments.budget);
+    let mut stage = OnStage::new(library, pack, device, &arguments.output.out)?;
     if !arguments.replay.is_empty() {
         return replay(&arguments.replay, &mut stage);
     }
@@ -64,6 +75,7 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
     let place = show::Place {
         report: stage.report(),
         conversations: &stage.conversations(&explored)?,
+        remarks: &stage.remarks(&explored)?,
     };
     super::print(&show::explored(
         &explored,
@@ -72,11 +84,14 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
         place,
         arguments.output.format,
     )?)?;
-    let fails = explored.findings.iter().any(|one| one.finding.verdict == Verdict::Fail);
+    let fails = explored.findings.iter().any(Shown::fails);
+    // There was no time to see whether it shows again.
+    let is_open = |one: &Shown| one.shows.1 == 0 && one.finding.verdict == Verdict::Fail;
+    let open = explored.remarks.iter().any(is_open) || explored.conversations == explored.undecided.0;
     Ok(match (fails, explored.interrupted) {
         (_, true) => Exit::Interrupted,
         (true, _) => Exit::DoesNotConform,
-        (false, _) if explored.conversations == explored.undecided.0 => Exit::Undecided,
+        (false, _) if open => Exit::Undecided,
         (false, _) => Exit::Conforms,
     })
 }
@@ -115,7 +130,7 @@ fn focused(mut grammar: Grammar, focus: &[String]) -> Result<Grammar, Problem> {
 /// Carries out conversations that stand in files.
 fn replay(paths: &[std::path::PathBuf], stage: &mut OnStage) -> Result<Exit, Problem> {
     let files: Result<Vec<_>, Problem> = paths.iter().map(|path| read(path)).collect();
-    let result = stage.carry_out(&files?, Purpose::Evidence)?;
+    let result = stage.carry_out(&files?, Purpose::Evidence, None)?.result;
     super::print(&show::replayed(&result))?;
     Ok(Exit::of(result.verdict))
 }

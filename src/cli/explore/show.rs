@@ -1,5 +1,6 @@
 //! What an exploration found, for people and for programs.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -19,6 +20,8 @@ pub(super) struct Place<'a> {
     pub(super) report: Option<&'a Path>,
     /// The folder of the conversations that show the findings.
     pub(super) conversations: &'a Path,
+    /// The folder of the conversations of the remarks.
+    pub(super) remarks: &'a Path,
 }
 
 /// What may be said in which situation.
@@ -56,6 +59,7 @@ pub(super) fn explored(
     let findings = explored.findings.iter();
     if format == Format::Json {
         let all: Vec<_> = findings.map(|shown| finding(shown, place)).collect();
+        let remarks: Vec<_> = explored.remarks.iter().map(|shown| finding(shown, place)).collect();
         let left_out = explored
             .left_out
             .iter()
@@ -66,51 +70,37 @@ pub(super) fn explored(
             "conversations": explored.conversations,
             "stimuli": explored.stimuli,
             "undecided": explored.undecided.0,
+            "why": explored.undecided.1,
             "pairs": { "tried": explored.pairs.0, "of": explored.pairs.1 },
             "coverage": explored.coverage.table(),
             "leftOut": left_out.collect::<Vec<_>>(),
             "interrupted": explored.interrupted,
             "report": place.report.map(|folder| folder.display().to_string()),
             "findings": all,
+            "remarks": remarks,
         });
         let text = serde_json::to_string_pretty(&value).map_err(|error| Problem::Environment(error.to_string()))?;
         return Ok(format!("{text}\n"));
     }
     let mut text = String::new();
     for shown in findings {
-        let one = &shown.finding;
-        let asks = catalogue
-            .get(&one.requirement)
-            .map_or("", |requirement| requirement.text.as_str());
-        let word = if one.verdict == Verdict::Fail {
-            "FAIL"
-        } else {
-            "WARNING"
+        let word = match shown.finding.verdict {
+            Verdict::Fail => "FAIL",
+            _ => "WARNING",
         };
-        let _ = writeln!(text, "{word} {}  {asks}", one.requirement);
-        let _ = writeln!(text, "  seen     {}", one.message);
-        let by = match &one.source {
-            Source::Stimulus(name) => format!("what must be heard after {name}"),
-            Source::Monitor(name) => format!("the monitor {name}"),
-        };
-        let times = if one.count == 1 {
-            "conversation"
-        } else {
-            "conversations"
-        };
-        let _ = writeln!(text, "  by       {by}, in {} {times}", one.count);
-        let _ = writeln!(text, "  shortest {}", one.chain.stimuli().join(", "));
-        if shown.shows.0 < shown.shows.1 {
-            let _ = writeln!(text, "  shows    in {} of {} attempts", shown.shows.0, shown.shows.1);
-        }
-        let again = again(std::env::args().skip(1), &path(shown, place));
-        let _ = writeln!(text, "  again    vda5050-tck {again}");
-        text.push('\n');
+        described(word, shown, catalogue, place, &mut text);
+    }
+    for shown in &explored.remarks {
+        described("REMARK", shown, catalogue, place, &mut text);
     }
     if !explored.left_out.is_empty() {
         let _ = writeln!(text, "{} stimuli do not apply to the device:", explored.left_out.len());
+        let mut reasons: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
         for (name, why) in &explored.left_out {
-            let _ = writeln!(text, "  {name:<24} {why}");
+            reasons.entry(why).or_default().push(name);
+        }
+        for (why, names) in reasons {
+            let _ = writeln!(text, "  {why}\n    {}", names.join(", "));
         }
         text.push('\n');
     }
@@ -120,6 +110,9 @@ pub(super) fn explored(
         "{} conversations of {} stimuli, seed {}; {tried} of {of} pairs of situation and stimulus tried",
         explored.conversations, explored.stimuli, exploration.seed
     );
+    if let (0, Some(why)) = (explored.conversations, &explored.undecided.1) {
+        let _ = writeln!(text, "no conversation was held: {why}");
+    }
     if explored.undecided.0 > 0 {
         let why = explored.undecided.1.as_deref().unwrap_or("no reason was given");
         let _ = writeln!(
@@ -147,10 +140,52 @@ pub(super) fn explored(
     Ok(text)
 }
 
+/// One finding, in the words for people.
+fn described(word: &str, shown: &Shown, catalogue: &Catalogue, place: Place<'_>, text: &mut String) {
+    let one = &shown.finding;
+    let asks = catalogue
+        .get(&one.requirement)
+        .map_or("", |requirement| requirement.text.as_str());
+    let _ = writeln!(text, "{word} {}  {asks}", one.requirement);
+    let _ = writeln!(text, "  seen     {}", one.message);
+    let times = if one.count == 1 {
+        "conversation"
+    } else {
+        "conversations"
+    };
+    let _ = writeln!(text, "  by       {}, in {} {times}", by(&one.source), one.count);
+    if !shown.others.is_empty() {
+        let others: Vec<String> = shown.others.iter().map(|other| by(&other.source)).collect();
+        let _ = writeln!(text, "  and by   {}", others.join(", "));
+    }
+    let _ = writeln!(text, "  shortest {}", one.chain.stimuli().join(", "));
+    match shown.shows {
+        (_, 0) => text.push_str("  shows    the time was up before it could be seen again\n"),
+        (times, of) if times < of => {
+            let _ = writeln!(text, "  shows    in {times} of {of} attempts");
+        }
+        _ => {}
+    }
+    let again = again(std::env::args().skip(1), &path(shown, place));
+    let _ = writeln!(text, "  again    vda5050-tck {again}\n");
+}
+
+fn by(source: &Source) -> String {
+    match source {
+        Source::Stimulus(name) => format!("what must be heard after {name}"),
+        Source::Monitor(name) => format!("the monitor {name}"),
+    }
+}
+
 fn path(shown: &Shown, place: Place<'_>) -> String {
     let id = &shown.file.id;
     let name = id.rsplit('/').next().unwrap_or(id);
-    place.conversations.join(format!("{name}.yaml")).display().to_string()
+    let folder = if shown.is_certain() {
+        place.conversations
+    } else {
+        place.remarks
+    };
+    folder.join(format!("{name}.yaml")).display().to_string()
 }
 
 fn finding(shown: &Shown, place: Place<'_>) -> serde_json::Value {
@@ -166,6 +201,7 @@ fn finding(shown: &Shown, place: Place<'_>) -> serde_json::Value {
         "message": one.message,
         "conversations": one.count,
         "shortest": one.chain.stimuli(),
+        "others": shown.others.iter().map(|other| by(&other.source)).collect::<Vec<_>>(),
         "shows": { "times": shown.shows.0, "of": shown.shows.1 },
         "file": path(shown, place),
     })

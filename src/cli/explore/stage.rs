@@ -14,21 +14,25 @@ use crate::cli::problem::Problem;
 use crate::cli::run::{hold, person};
 use crate::ui::Prompter;
 use tck_base::clock::WallClock;
-use tck_explore::{ConversationFile, Explored, Purpose, Stage};
+use tck_course::HERE;
+use tck_explore::{ConversationFile, Explored, Purpose, Round, Shown, Stage};
 use tck_journal::Reason;
+use tck_journal::event::Event;
 use tck_journal::file::JournalWriter;
 use tck_judge::Library;
 use tck_judge::RunJudge;
 use tck_pack::{Catalogue, Pack, Participant, Role};
 use tck_profile::{Effective, Surroundings};
 use tck_report::junit::Inconclusive;
-use tck_result::RunResult;
 use tck_run::{
     Bundle, Finished, LiveRun, ProfileContext, Request, Selection, Silent, VirtualRun, run_virtually, sources,
     write_all,
 };
 use tck_simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
 use tck_suite::model::Test;
+
+/// So many seeds are drawn from where nobody names one.
+const SEEDS: u64 = 1_000_000;
 
 /// What is explored.
 pub(super) enum Device {
@@ -46,6 +50,22 @@ pub(super) enum Device {
 }
 
 impl Device {
+    /// The seed where nobody names one: a built-in device is told the same every time, and others something else.
+    pub(super) fn usual_seed(&self) -> u64 {
+        match self {
+            Self::Virtual { .. } | Self::BuiltIn { .. } => 1,
+            Self::Profile { .. } => u64::try_from(WallClock::start().now().utc.as_millisecond()).unwrap_or(1) % SEEDS,
+        }
+    }
+
+    /// How many conversations are drawn at once at most: what was learned of a device on a clock is used soon.
+    pub(super) fn most_at_once(&self) -> usize {
+        match self {
+            Self::Virtual { .. } => 200,
+            Self::BuiltIn { .. } | Self::Profile { .. } => 8,
+        }
+    }
+
     pub(super) fn of(
         arguments: &Explore,
         effective: &Effective,
@@ -88,8 +108,8 @@ pub(super) struct OnStage {
     reports: PathBuf,
     runtime: Runtime,
     interrupt: watch::Receiver<bool>,
-    /// How long stimuli are tried and conversations carried out, and since when.
-    budget: Option<(Instant, Duration)>,
+    /// When the exploration began.
+    begun: Instant,
     desk: Prompter,
     rounds: u32,
     kept: Option<PathBuf>,
@@ -113,20 +133,11 @@ impl OnStage {
             runtime,
             interrupt: stop.subscribe(),
             desk: Prompter::new(stop),
-            budget: None,
+            begun: Instant::now(),
             rounds: 0,
             kept: None,
             evidence: None,
         })
-    }
-
-    /// Sets the time after which no conversation that was drawn begins. Stimuli are tried one by one for half of
-    /// this time at most.
-    pub(super) fn within(self, budget: Option<Duration>) -> Self {
-        Self {
-            budget: budget.map(|budget| (Instant::now(), budget)),
-            ..self
-        }
     }
 
     pub(super) fn catalogue(&self) -> &Catalogue {
@@ -144,33 +155,41 @@ impl OnStage {
         if let Some(evidence) = &self.evidence {
             return Ok(evidence.join("tests"));
         }
+        self.written(&explored.findings)
+    }
+
+    /// The folder that holds the conversations of the remarks.
+    pub(super) fn remarks(&self, explored: &Explored) -> Result<PathBuf, Problem> {
+        self.written(&explored.remarks)
+    }
+
+    fn written(&self, all: &[Shown]) -> Result<PathBuf, Problem> {
         let folder = self.reports.join("conversations");
-        for shown in &explored.findings {
+        for shown in all {
             write(&folder, &shown.file)?;
         }
         Ok(folder)
     }
 
-    fn request(tests: Vec<Arc<Test>>, run: &str) -> Request {
+    fn request(tests: Vec<Arc<Test>>, run: &str, purpose: Purpose) -> Request {
         Request {
+            // No test fits into no time.
+            budget: (purpose == Purpose::Gates).then_some(Duration::ZERO),
             tests: Selection::some(tests),
             run: run.to_owned(),
             command: std::env::args().collect(),
             repeat: 1,
+            limits: vec!["This is a part of an exploration, which ends when its time is up (--budget).".to_owned()],
             ..Request::default()
         }
     }
 
     /// What ends a run: a person, or the end of its time.
-    fn end(&self, purpose: Purpose) -> watch::Receiver<bool> {
-        let end = self.budget.and_then(|(begun, budget)| match purpose {
-            Purpose::Probe => Some(begun + budget / 2),
-            Purpose::Conversations => Some(begun + budget),
-            Purpose::Trial | Purpose::Evidence => None,
-        });
-        let Some(time_is_up) = end else {
+    fn end(&self, within: Option<Duration>) -> watch::Receiver<bool> {
+        let Some(within) = within else {
             return self.interrupt.clone();
         };
+        let time_is_up = Instant::now() + within;
         let mut person = self.interrupt.clone();
         let (ends, end) = watch::channel(false);
         self.runtime.spawn(async move {
@@ -187,11 +206,11 @@ impl OnStage {
     fn finished(
         &self,
         tests: Vec<Arc<Test>>,
-        run: &str,
+        (run, purpose): (&str, Purpose),
         writer: Option<JournalWriter>,
         interrupt: watch::Receiver<bool>,
     ) -> Result<Finished, Problem> {
-        let request = Self::request(tests, run);
+        let request = Self::request(tests, run, purpose);
         let (library, pack) = (&self.library, &self.pack);
         match &self.device {
             Device::Virtual { device, faults } => {
@@ -203,6 +222,7 @@ impl OnStage {
                     begun: WallClock::start().now().utc,
                     run: request.run,
                     command: request.command,
+                    budget: request.budget,
                     ..VirtualRun::of_role(device.role(), library, pack)
                 };
                 let (mut nobody, mut nowhere) = (Silent, |_: &RunJudge| {});
@@ -268,7 +288,12 @@ impl OnStage {
 impl Stage for OnStage {
     type Error = Problem;
 
-    fn carry_out(&mut self, files: &[ConversationFile], purpose: Purpose) -> Result<RunResult, Problem> {
+    fn carry_out(
+        &mut self,
+        files: &[ConversationFile],
+        purpose: Purpose,
+        within: Option<Duration>,
+    ) -> Result<Round, Problem> {
         let side = self.subject().role.word();
         let places = files.iter().map(|file| (file.place(side), file.text.clone()));
         let places: Vec<(String, String)> = places.collect();
@@ -278,8 +303,8 @@ impl Stage for OnStage {
         tests.sort_by_key(|test| files.iter().position(|file| file.id == test.id));
         self.rounds += 1;
         let run = format!("explore-{}", self.rounds);
-        if matches!(purpose, Purpose::Probe | Purpose::Trial) {
-            return Ok(self.finished(tests, &run, None, self.end(purpose))?.result);
+        if matches!(purpose, Purpose::Gates | Purpose::Probe | Purpose::Trial) {
+            return Ok(round(self.finished(tests, (&run, purpose), None, self.end(within))?));
         }
         let subject = self.subject();
         let utc = WallClock::start().now().utc;
@@ -289,17 +314,37 @@ impl Stage for OnStage {
             write(&bundle.folder().join("tests"), file)?;
         }
         let writer = bundle.journal().map_err(environment)?;
-        let finished = self.finished(tests, &run, Some(writer), self.end(purpose))?;
+        let finished = self.finished(tests, (&run, purpose), Some(writer), self.end(within))?;
         let quoted = sources(&self.library.rules.catalogue, &self.library.rules.suites, &self.pack);
         let journal = finished.recorder.journal();
         write_all(&bundle, &finished.result, &quoted, journal, Inconclusive::default()).map_err(environment)?;
         self.kept = Some(bundle.folder().to_owned());
         self.evidence = (purpose == Purpose::Evidence).then(|| bundle.folder().to_owned());
-        Ok(finished.result)
+        Ok(round(finished))
+    }
+
+    fn spent(&self) -> Duration {
+        self.begun.elapsed()
     }
 
     fn interrupted(&self) -> bool {
         *self.interrupt.borrow()
+    }
+}
+
+/// What came of a run, and where its conversations began.
+fn round(finished: Finished) -> Round {
+    let entries = finished.recorder.journal().entries().iter();
+    let began = entries.filter_map(|entry| match entry.event() {
+        Event::TestBegun { test, bindings, .. } => {
+            let node = bindings.get("course")?.get(HERE)?.as_str()?;
+            Some((test.clone(), node.to_owned()))
+        }
+        _ => None,
+    });
+    Round {
+        began: began.collect(),
+        result: finished.result,
     }
 }
 

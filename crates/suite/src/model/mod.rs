@@ -35,6 +35,8 @@ pub struct Test {
     pub tags: Vec<String>,
     /// What it says one after the other, when it is a conversation that was written down.
     pub conversation: Vec<ConversationPart>,
+    /// The node on which the vehicle has to stand when it begins; where it stands, when nothing is said.
+    pub begins: Option<String>,
     /// How far the test itself is trusted.
     pub maturity: Maturity,
     /// Why anybody cares.
@@ -162,7 +164,7 @@ pub enum Need {
     Limit(String),
 }
 
-pub use conversation::{BrokenMember, ConversationPart};
+pub use conversation::{BrokenMember, ConversationPart, place_in_body};
 pub use monitor::{About, Monitor, Recordings, Rule};
 pub use path::Path;
 pub use purpose::Purpose;

@@ -107,8 +107,11 @@ impl Persona {
         }
     }
 
-    /// All that was told ends.
+    /// All that was told ends, and what the vehicle has brought away stands where it stood before.
     fn behave_well(&mut self, agv: &mut Agv) {
+        if agv.loads.is_empty() {
+            agv.stations.clone_from(&agv.config.stations);
+        }
         self.declare_nothing(agv);
         if std::mem::take(self).replaced {
             republish(agv);
