@@ -227,7 +227,9 @@ impl<L: Link, O: Operator> Engine<L, O> {
                 }
                 watcher.waiting(step);
                 match self.step(step, section, watcher).await {
-                    Ok(StepEnd::Refused(_) | StepEnd::Declined(_)) => goes_on_at = test.goes_on_at(&step.path).unwrap_or(0),
+                    Ok(StepEnd::Refused(_) | StepEnd::Declined(_)) => {
+                        goes_on_at = test.goes_on_at(&step.path).unwrap_or(0)
+                    }
                     Ok(_) => {}
                     Err(error) => {
                         // The postamble is still tried: a device must not be left driving.
