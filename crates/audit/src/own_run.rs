@@ -48,6 +48,7 @@ pub fn own_run(
         }
     };
     let mut last = first.at;
+    let mut is_whole = false;
     keep(judge.observe(&Entry::new(first)), last.utc);
     while let Some(item) = recorded.read()? {
         let Item::Record(record) = item else { continue };
@@ -57,6 +58,7 @@ pub fn own_run(
         }
         let ended = matches!(record.event, Event::RunEnded { .. });
         keep(judge.observe(&Entry::new(*record)), last.utc);
+        is_whole |= ended;
         if ended {
             keep(judge.finish(last.moment), last.utc);
         }
@@ -70,6 +72,8 @@ pub fn own_run(
     let decided: BTreeSet<(String, String)> = judge.decided().into_iter().collect();
     let seen = messages.values().sum();
     let side = SideResult::new(role, seen, judged, found.into_values().collect(), decided, Vec::new());
+    // What a run that was cut short would have shown nobody knows.
+    let side = side.unless((!is_whole).then_some("the journal ends before its run does"));
     Ok(VehicleResult {
         topics: header.topics.get("state").cloned().unwrap_or_default(),
         manufacturer: header.manufacturer,
@@ -122,4 +126,42 @@ fn keep(
     });
     known.count += finding.count;
     known.last = at;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The journal of a run, as far as its first lines go.
+    fn judged(lines: usize) -> SideResult {
+        let path = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../fixtures/journals/refusal-corrected-level/journal.jsonl"
+        );
+        let text = std::fs::read_to_string(path).expect("fixture");
+        let some: Vec<&str> = text.lines().take(lines).collect();
+        let reader = Box::new(std::io::Cursor::new(some.join("\n")));
+        let mut recorded: Recorded = tck_capture::Lines::new(reader, 0, tck_capture::Mapping::default()).into();
+        let Some(Item::Record(first)) = recorded.read().expect("readable") else {
+            panic!("no journal");
+        };
+        let rules = &tck_testing::library().rules;
+        let vehicle = own_run(rules, &Options::default(), 0, *first, &mut recorded).expect("judged");
+        vehicle.sides.into_iter().next().expect("a side")
+    }
+
+    #[test]
+    fn a_run_that_was_cut_short_keeps_nothing() {
+        let kept = |side: &SideResult| {
+            let mut requirements = side.requirements.iter();
+            requirements.any(|known| known.verdict == Verdict::Pass)
+        };
+        let whole = judged(usize::MAX);
+        assert!(kept(&whole) && whole.not_judged.is_none(), "{whole:#?}");
+        for lines in [1, 3, 30] {
+            let cut = judged(lines);
+            assert!(!kept(&cut) && cut.verdict != Some(Verdict::Pass), "{lines}: {cut:#?}");
+            assert!(cut.not_judged.is_some(), "{lines}");
+        }
+    }
 }
