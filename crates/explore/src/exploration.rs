@@ -343,14 +343,16 @@ impl Exploration {
 
     /// Holds conversations: a few are drawn, carried out, and what came of them is known to those that are drawn next.
     fn converse<S: Stage>(&self, known: &mut Known, stage: &mut S, note: &mut dyn FnMut(&str)) -> Result<(), S::Error> {
+        const SHARE: f64 = 0.7;
         let mut random = Random::new(self.seed);
         let (mut number, mut fruitless) = (0, 0);
         while number < self.conversations && fruitless < FRUITLESS {
             // What was found has to be made shorter, which takes time as well.
-            let share = if known.found.is_empty() { 1.0 } else { 0.7 };
-            if self.is_over(stage, share) {
-                break;
-            }
+            let share = match self.is_over(stage, SHARE) {
+                false => SHARE,
+                true if known.found.is_empty() && !self.is_over(stage, 1.0) => 1.0,
+                true => break,
+            };
             let until = self.conversations.min(number + self.at_once.max(1));
             let drawn: Vec<(Chain, ConversationFile)> = (number + 1..=until)
                 .map(|number| self.one(&known.grammar, &mut random, number, &mut known.coverage))

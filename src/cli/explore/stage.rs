@@ -205,13 +205,14 @@ impl OnStage {
 
     fn finished(
         &self,
+        library: &Library,
         tests: Vec<Arc<Test>>,
         (run, purpose): (&str, Purpose),
         writer: Option<JournalWriter>,
         interrupt: watch::Receiver<bool>,
     ) -> Result<Finished, Problem> {
         let request = Self::request(tests, run, purpose);
-        let (library, pack) = (&self.library, &self.pack);
+        let pack = &self.pack;
         match &self.device {
             Device::Virtual { device, faults } => {
                 let asked = VirtualRun {
@@ -231,7 +232,7 @@ impl OnStage {
             }
             Device::BuiltIn { device, faults } => {
                 let run = LiveRun::built_in(device.clone(), faults, library, pack);
-                self.over_sockets(run, request, writer, interrupt)
+                self.over_sockets(library, run, request, writer, interrupt)
             }
             Device::Profile {
                 effective,
@@ -249,13 +250,14 @@ impl OnStage {
                 if *still {
                     run.device.stand_still(Reason::MotionRuledOut);
                 }
-                self.over_sockets(run, request, writer, interrupt)
+                self.over_sockets(library, run, request, writer, interrupt)
             }
         }
     }
 
     fn over_sockets(
         &self,
+        library: &Library,
         mut run: LiveRun,
         request: Request,
         writer: Option<JournalWriter>,
@@ -263,7 +265,7 @@ impl OnStage {
     ) -> Result<Finished, Problem> {
         run.request = request;
         run.hold = hold(&self.desk);
-        let (library, pack) = (&self.library, &self.pack);
+        let pack = &self.pack;
         let (mut nobody, mut nowhere) = (Silent, |_: &RunJudge| {});
         let run = run.carry_out(library, pack, writer, interrupt, &mut nobody, &mut nowhere);
         self.runtime.block_on(run).map_err(environment)
@@ -297,14 +299,22 @@ impl Stage for OnStage {
         let side = self.subject().role.word();
         let places = files.iter().map(|file| (file.place(side), file.text.clone()));
         let places: Vec<(String, String)> = places.collect();
-        let tests = self.library.add(&places)?;
+        // Each round stands by itself: what was tried before may be tried again under its name.
+        let mut library = self.library.clone();
+        let tests = library.add(&places)?;
         // Tests are added in the order of their ids; they are carried out as they were given.
         let mut tests: Vec<Arc<Test>> = tests;
         tests.sort_by_key(|test| files.iter().position(|file| file.id == test.id));
         self.rounds += 1;
         let run = format!("explore-{}", self.rounds);
         if matches!(purpose, Purpose::Gates | Purpose::Probe | Purpose::Trial) {
-            return Ok(round(self.finished(tests, (&run, purpose), None, self.end(within))?));
+            return Ok(round(self.finished(
+                &library,
+                tests,
+                (&run, purpose),
+                None,
+                self.end(within),
+            )?));
         }
         let subject = self.subject();
         let utc = WallClock::start().now().utc;
@@ -314,8 +324,8 @@ impl Stage for OnStage {
             write(&bundle.folder().join("tests"), file)?;
         }
         let writer = bundle.journal().map_err(environment)?;
-        let finished = self.finished(tests, (&run, purpose), Some(writer), self.end(within))?;
-        let quoted = sources(&self.library.rules.catalogue, &self.library.rules.suites, &self.pack);
+        let finished = self.finished(&library, tests, (&run, purpose), Some(writer), self.end(within))?;
+        let quoted = sources(&library.rules.catalogue, &library.rules.suites, &self.pack);
         let journal = finished.recorder.journal();
         write_all(&bundle, &finished.result, &quoted, journal, Inconclusive::default()).map_err(environment)?;
         self.kept = Some(bundle.folder().to_owned());
