@@ -1,16 +1,15 @@
-//! The suites that ship with the tool load without a complaint, and what they cover is written down.
+//! The suites that ship with the tool load without a complaint; `list coverage` says what they cover.
 
 #![expect(clippy::expect_used, clippy::panic, reason = "helpers of tests")]
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write as _;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use vda5050_tck::checks;
 use vda5050_tck::pack::{Assets, Catalogue, Hooks, Packs, Role};
 use vda5050_tck::suite::{CheckInfo, Suites};
 
-fn load() -> (Suites, Catalogue) {
+fn load() -> Suites {
     // Files of a folder are linted; those the program carries were, by this test.
     let assets = Assets::of_folder(Path::new(env!("CARGO_MANIFEST_DIR"))).expect("suites and schemas");
     let packs = Packs::load(&assets).expect("packs");
@@ -25,18 +24,17 @@ fn load() -> (Suites, Catalogue) {
         })
         .collect();
     let hooks = Hooks::load(&assets).expect("hooks");
-    let suites = Suites::load(&assets, &packs, &catalogue, &known, &hooks).unwrap_or_else(|diagnostics| {
+    Suites::load(&assets, &packs, &catalogue, &known, &hooks).unwrap_or_else(|diagnostics| {
         for diagnostic in &diagnostics {
             println!("{}", diagnostic.render(false));
         }
         panic!("{} diagnostics", diagnostics.len())
-    });
-    (suites, catalogue)
+    })
 }
 
 #[test]
 fn every_suite_loads_without_a_complaint() {
-    let (suites, _) = load();
+    let suites = load();
     let agv = suites.tests.iter().filter(|test| test.device == Role::Agv);
     let files: BTreeSet<&str> = agv.map(|test| test.id.split('[').next().unwrap_or_default()).collect();
     assert!(files.len() >= 60, "only {} files", files.len());
@@ -44,7 +42,7 @@ fn every_suite_loads_without_a_complaint() {
 
 #[test]
 fn every_title_is_a_sentence_without_holes() {
-    let (suites, _) = load();
+    let suites = load();
     for test in &suites.tests {
         let steps = test.sections().into_iter().flat_map(|(_, steps)| steps);
         let titles = steps.filter_map(|step| step.title.as_deref());
@@ -59,7 +57,7 @@ fn every_title_is_a_sentence_without_holes() {
 
 #[test]
 fn every_named_check_has_a_monitor_or_a_test() {
-    let (suites, _) = load();
+    let suites = load();
     for check in checks::REGISTRY {
         let named = format!("check: {}", check.name);
         let runs = |text: &str| text.split(&named).skip(1).any(|rest| rest.starts_with(['\n', ' ']));
@@ -74,42 +72,8 @@ fn every_named_check_has_a_monitor_or_a_test() {
 
 #[test]
 fn every_test_decides_something() {
-    let (suites, _) = load();
+    let suites = load();
     for test in &suites.tests {
         assert!(!test.requirements().is_empty(), "{} decides nothing", test.id);
     }
-}
-
-/// Requirements of each side, and the tests and monitors that decide them.
-#[test]
-fn the_requirements_covered_are_written_down() {
-    insta::assert_snapshot!("agv_requirements", covered(Role::Agv));
-    insta::assert_snapshot!("master_control_requirements", covered(Role::MasterControl));
-}
-
-fn covered(role: Role) -> String {
-    let (suites, catalogue) = load();
-    let mut by: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-    for test in suites.tests.iter().filter(|test| test.device == role) {
-        let file = test.id.split('[').next().unwrap_or_default();
-        for requirement in test.requirements() {
-            by.entry(requirement.to_string()).or_default().insert(file.to_owned());
-        }
-    }
-    let monitors = suites.monitors.iter();
-    for monitor in monitors.filter(|monitor| monitor.device.is_none_or(|device| device == role)) {
-        for binding in &monitor.checks {
-            let entry = by.entry(binding.requirement.to_string()).or_default();
-            entry.insert(format!("monitor {}", monitor.id));
-        }
-    }
-    let mut text = String::new();
-    for requirement in catalogue.all().filter(|requirement| requirement.role.concerns(role)) {
-        let deciders = by.get(requirement.id.as_str()).map_or_else(
-            || "-".to_owned(),
-            |names| names.iter().cloned().collect::<Vec<_>>().join(", "),
-        );
-        let _ = writeln!(text, "{}: {deciders}", requirement.id);
-    }
-    text
 }
