@@ -206,6 +206,7 @@ fn what_does_not_fit_into_the_budget_is_left_out_by_name_and_gone_on_with() {
         .code(0)
         .prints("Joined from 2 runs");
     let result = bench.result();
+    assert!(!result["limits"].to_string().contains("--budget"), "{result}");
     assert_eq!(verdicts(&result).len(), all);
     assert!(
         verdicts(&result).iter().all(|(_, verdict)| *verdict == "pass"),

@@ -282,7 +282,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         let mut number = 0;
         let mut gone: Option<String> = None;
         let mut failed: Option<String> = None;
-        let mut without_time = 0;
+        let mut is_short_of_time = false;
         // What nobody answered is asked again when all else is done.
         let mut queue: VecDeque<(usize, bool)> = (0..tests.len()).map(|at| (at, false)).collect();
         while let Some((at, again)) = queue.pop_front() {
@@ -306,11 +306,10 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
                     break;
                 }
                 if let Some(why) = over_budget {
-                    if without_time == 0 {
+                    if !std::mem::replace(&mut is_short_of_time, true) {
                         self.progress
                             .note("tests that do not fit into the budget any more are left out");
                     }
-                    without_time += 1;
                     plan.tests[at].gate = Gate::Unobservable(why);
                     break;
                 }
@@ -367,15 +366,6 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
                     }
                 }
             }
-        }
-        if let Some(first) = &failed {
-            let limit = format!("No test was run after {first}, which failed (--fail-fast).");
-            self.setup.limits.push(limit);
-        }
-        if without_time > 0 {
-            let limit =
-                format!("Of the selected tests {without_time} had no time (--budget): they were not carried out.");
-            self.setup.limits.push(limit);
         }
         if let (Some(why), None) = (&gone, self.stopped()) {
             self.record_plan(&plan)?;

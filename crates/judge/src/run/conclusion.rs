@@ -79,6 +79,7 @@ impl RunJudge {
             Some(earlier) => self.reactions.after(&earlier.reactions).result(),
             None => self.reactions.result(),
         };
+        let limits = self.limits(&tests);
         let mut result = RunResult {
             format: RESULT_FORMAT.to_owned(),
             tool: header.tool.clone(),
@@ -119,7 +120,7 @@ impl RunJudge {
                 })
                 .collect(),
             fleet,
-            limits: self.limits(),
+            limits,
             deviations: self.plan.deviations.clone(),
             settings: header.settings.clone(),
         };
@@ -143,8 +144,26 @@ impl RunJudge {
         before.or_else(|| self.company.mixed())
     }
 
-    /// What restricts the statement, the harness's own lag included.
-    fn limits(&self) -> Vec<String> {
+    /// What restricts the statement, and what was not carried out of these tests.
+    fn limits(&self, tests: &[TestResult]) -> Vec<String> {
+        let mut limits = self.standing_limits();
+        let without_time = tests.iter().filter(|test| test.ran_out_of_time()).count();
+        let no_time = (without_time > 0).then(|| {
+            format!("Of the selected tests {without_time} had no time (--budget): they were not carried out.")
+        });
+        let first = tests.iter().find_map(|test| match &test.cause {
+            Some(Reason::AfterFailure { test }) => Some(test),
+            _ => None,
+        });
+        let failed = first.map(|first| format!("No test was run after {first}, which failed (--fail-fast)."));
+        let new = no_time.into_iter().chain(failed);
+        let new: Vec<String> = new.filter(|limit| !limits.contains(limit)).collect();
+        limits.extend(new);
+        limits
+    }
+
+    /// What restricts this run and those before it whatever their tests show, the harness's own lag included.
+    fn standing_limits(&self) -> Vec<String> {
         let mut limits = self.plan.limits.clone();
         let lag = self.timeline.longest_lag();
         if !lag.is_zero() {
@@ -160,7 +179,7 @@ impl RunJudge {
             limits.push(UNTRACED.to_owned());
         }
         limits.extend(self.company.limits());
-        let before = self.earlier.iter().flat_map(|earlier| earlier.limits());
+        let before = self.earlier.iter().flat_map(|earlier| earlier.standing_limits());
         let before: Vec<String> = before.filter(|limit| !limits.contains(limit)).collect();
         limits.extend(before);
         limits
