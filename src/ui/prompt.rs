@@ -38,12 +38,17 @@ struct Shared {
     terminal: Mutex<()>,
 }
 
+/// Takes a question that is asked.
+type OnAsked = Box<dyn Fn(&Question) + Send>;
+/// Takes the number of a question, and its answer.
+type OnAnswered = Box<dyn Fn(u64, &Answer) + Send>;
+
 /// Hears of questions and of their answers.
 pub struct Follower {
     /// A question is asked.
-    pub asked: Box<dyn Fn(&Question) + Send>,
+    pub asked: OnAsked,
     /// The question of this number is answered so.
-    pub answered: Box<dyn Fn(u64, &Answer) + Send>,
+    pub answered: OnAnswered,
 }
 
 impl std::fmt::Debug for Follower {

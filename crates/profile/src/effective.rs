@@ -354,15 +354,6 @@ impl Taken<'_> {
             wrong.push(self.at("device.node-bound", title, "and `stops-between-nodes` says otherwise"));
         }
         for claim in self.claims() {
-            if let Claim::NoHook(name) = &claim
-                && !self.hooks.find(name, Role::Agv).is_some_and(|hook| hook.optional)
-            {
-                let optional = self.hooks.of(Role::Agv).filter(|hook| hook.optional);
-                let names: Vec<&str> = optional.map(|hook| hook.name.as_str()).collect();
-                let title = format!("a device cannot do without `{name}`");
-                let hint = format!("only these may be missing at a device: {}", names.join(", "));
-                wrong.push(self.at("device.claims", title, "the claims").hint(hint));
-            }
             let (Claim::Statement(name) | Claim::NoStatement(name)) = &claim else {
                 continue;
             };

@@ -158,7 +158,7 @@ impl Reader<'_> {
         for (name, value) in table {
             let path = format!("{section}.{}", name.get_ref());
             if let Some(key) = Key::find(&path) {
-                match Value::from_toml(key.kind, value.get_ref(), self.folder) {
+                match Value::from_toml(key.kind, value.get_ref(), self.folder, self.hooks) {
                     Ok(checked) => {
                         let span = self.span(value.span());
                         let setter = Setter {
@@ -248,7 +248,7 @@ impl Reader<'_> {
     }
 
     fn text(&mut self, what: &str, value: &Spanned<DeValue<'_>>) -> Option<String> {
-        match Value::from_toml(Kind::Text, value.get_ref(), self.folder) {
+        match Value::from_toml(Kind::Text, value.get_ref(), self.folder, self.hooks) {
             Ok(Value::Text(text)) => Some(text),
             Ok(_) => None,
             Err(refusal) => {
