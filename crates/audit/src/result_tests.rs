@@ -75,7 +75,7 @@ fn what_is_found_at_one_place_of_one_message_is_one_mistake() {
 fn the_master_control_of_several_vehicles_is_judged_as_one() {
     let wrong = || vec![finding("X-1", Verdict::Fail, 3, "a")];
     let one = commanding("1", wrong());
-    assert_eq!(whole(&[one.clone()]), None);
+    assert_eq!(whole(std::slice::from_ref(&one)), None);
     // The same vehicle after an update is no second one.
     assert_eq!(whole(&[one.clone(), one.clone()]), None);
     let all = [one, commanding("2", Vec::new()), commanding("3", wrong())];
