@@ -290,7 +290,7 @@ impl Stage for OnStage {
         }
         let writer = bundle.journal().map_err(environment)?;
         let finished = self.finished(tests, &run, Some(writer), self.end(purpose))?;
-        let quoted = sources(&self.library.rules.catalogue, &self.library.rules.suites, &self.pack);
+        let quoted = sources(&self.library, &self.pack);
         let journal = finished.recorder.journal();
         write_all(&bundle, &finished.result, &quoted, journal, Inconclusive::default()).map_err(environment)?;
         self.kept = Some(bundle.folder().to_owned());

@@ -269,6 +269,7 @@ impl RunJudge {
             };
             all.push(RequirementResult {
                 id: id.to_owned(),
+                own: requirement.is_own.then(|| requirement.chapter.clone()),
                 verdict,
                 verdicts: opinions.verdicts(),
                 decided_by: opinions.by,
