@@ -55,7 +55,10 @@ pub fn library(own: Option<Own<'_>>) -> Result<Library, Vec<Diagnostic>> {
     if let Some(Own::Added(folder) | Own::Alone(folder)) = own {
         holds_suites(&assets, folder)?;
     }
-    Library::load(assets, tck_checks::REGISTRY)
+    let of_assets = assets.clone();
+    let given = |path: &str| of_assets.as_given(path);
+    let as_given = |all: Vec<Diagnostic>| all.into_iter().map(|one| one.renamed(&given)).collect();
+    Library::load(assets, tck_checks::REGISTRY).map_err(as_given)
 }
 
 /// Folders below `suites/` whose files test or judge something, and are not only used by others.

@@ -178,7 +178,7 @@ impl Tck {
                 (run.carry_out_silently(&library, &pack)?, pack)
             }
         };
-        let sources = sources(&library.rules.catalogue, &library.rules.suites, &pack);
+        let sources = sources(&library, &pack);
         Ok(Outcome { finished, sources })
     }
 }

@@ -44,7 +44,7 @@ fn make(folder: &Path) {
     for entry in finished.recorder.journal().entries() {
         writer.write(&entry.record).expect("written");
     }
-    let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
+    let quoted = sources(&library, &pack);
     write_all(
         &bundle,
         &finished.result,

@@ -80,7 +80,7 @@ fn rendered(folder: &Path, library: &Library, arguments: &Report, outputs: &Outp
     }
     let result = read(folder)?;
     let pack = super::pack(library, None)?;
-    let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
+    let quoted = sources(library, &pack);
     let text = |rendering: Rendering| match rendering {
         Rendering::Junit | Rendering::JunitRequirements => bundle::junit(&result),
         Rendering::Markdown => Ok(bundle::markdown(&result)),

@@ -23,10 +23,10 @@ pub(super) fn all(id: &str, library: &Library, pack: &Pack) -> Vec<Value> {
     let is_meant = |test: &&std::sync::Arc<Test>| test.id == id || test.id.split('[').next() == Some(id);
     if let Some(known) = tests.find(is_meant) {
         let cases = suites.tests.iter().filter(is_meant).count();
-        found.push(test(known, cases));
+        found.push(test(known, cases, library));
     }
     let monitors = suites.monitors.iter().filter(|monitor| monitor.id == id);
-    found.extend(monitors.map(|known| monitor(known)));
+    found.extend(monitors.map(|known| monitor(known, library)));
     if let Some(check) = tck_check::find(checks::REGISTRY, id) {
         found.push(json!({ "kind": "check", "id": id, "doc": check.doc, "decides": check.decides }));
     }
@@ -81,7 +81,41 @@ fn requirement(known: &Requirement, library: &Library, pack: &Pack) -> Value {
     json!({ "kind": "requirement", "id": id, "chapter": known.chapter, "text": known.text, "role": known.role.word(),
         "versions": versions, "inVersion": known.in_version(pack).is_some(), "interpretation": known.interpretation,
         "because": known.because, "otherwise": known.otherwise,
-        "decided": known.decided.word(), "tests": by, "monitors": monitors, "provedWith": proved })
+        "decided": known.decided.word(), "tests": by, "monitors": monitors, "provedWith": proved,
+        "repeat": repetitions(id, library) })
+}
+
+/// The commands that repeat a verdict about a requirement: at a device, and at a reference device that breaks it. What only
+/// monitors decide is judged in whatever is run.
+pub(super) fn repetitions(id: &str, library: &Library) -> Vec<String> {
+    let suites = &library.rules.suites;
+    let tested = |role: Role| suites.deciding(id).iter().any(|test| test.device == role);
+    let watched = |role: Role| {
+        let mut monitors = suites.monitors.iter();
+        monitors.any(|monitor| {
+            monitor.device.is_none_or(|device| device == role)
+                && monitor.checks.iter().any(|binding| binding.requirement.as_str() == id)
+        })
+    };
+    let selection = |role: Role| match tested(role) {
+        true => format!(" --requirement {id}"),
+        false => String::new(),
+    };
+    let mut all = Vec::new();
+    let roles = [(Role::Agv, ""), (Role::MasterControl, " --role master-control")];
+    for (role, flag) in roles.into_iter().filter(|(role, _)| tested(*role) || watched(*role)) {
+        all.push(format!("vda5050-tck run --profile device.toml{}", selection(role)));
+        let breaking = faults().find(|(of, fault)| *of == role && fault.breaks.first() == Some(&id));
+        if let Some((_, fault)) = breaking {
+            all.push(format!(
+                "vda5050-tck run --virtual{flag} --fault {}{}",
+                fault.name,
+                selection(role)
+            ));
+        }
+    }
+    all.dedup();
+    all
 }
 
 /// The tests that ask for a hook, each table once.
@@ -108,22 +142,22 @@ fn hook(known: &HookInfo, library: &Library) -> Value {
         "profile": [example.prompt, example.run, example.http], "request": example.request })
 }
 
-fn test(known: &Test, cases: usize) -> Value {
+fn test(known: &Test, cases: usize, library: &Library) -> Value {
     let steps = known.steps.iter().flat_map(tck_suite::model::Step::clauses);
     let decides: Vec<Value> = steps
         .map(|(requirement, clause)| json!({ "requirement": requirement, "clause": clause }))
         .collect();
-    json!({ "kind": "test", "id": known.id, "title": known.title, "why": known.why.trim(), "file": known.source.name,
+    json!({ "kind": "test", "id": known.id, "title": known.title, "why": known.why.trim(), "file": library.file_of(&known.source),
         "role": known.device.word(), "spec": known.spec.to_string(), "moves": known.moves, "tags": known.tags(),
         "hooks": known.hooks(), "cases": cases, "decides": decides, "source": known.source.text })
 }
 
-fn monitor(known: &Monitor) -> Value {
+fn monitor(known: &Monitor, library: &Library) -> Value {
     let decides: Vec<&str> = known.checks.iter().map(|one| one.requirement.as_str()).collect();
     let check = match &known.rule {
         Rule::Check(check) => Some(check.name.clone()),
         _ => None,
     };
     json!({ "kind": "monitor", "id": known.id, "title": known.title, "why": known.why.trim(),
-        "file": known.source.name, "decides": decides, "check": check })
+        "file": library.file_of(&known.source), "decides": decides, "check": check })
 }

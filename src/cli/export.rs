@@ -21,7 +21,7 @@ pub fn certificate(folder: &Path) -> Result<Exit, Problem> {
     let library = crate::assets::library(None)?;
     let (result, root) = intact(folder, &library)?;
     let pack = super::pack(&library, Some(&result.protocol))?;
-    let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
+    let quoted = sources(&library, &pack);
     let page = certificate::render(&result, &quoted, &root).map_err(|error| match error {
         CertificateError::Template(_) => Problem::Environment(error.to_string()),
         why => {
@@ -49,7 +49,7 @@ pub fn rendered(folder: &Path, library: &Library, arguments: &Report, outputs: &
     let pack = super::pack(library, Some(&result.protocol))?;
     let shown = Shown {
         result: &result,
-        sources: &sources(&library.rules.catalogue, &library.rules.suites, &pack),
+        sources: &sources(library, &pack),
         inconclusive: arguments.inconclusive,
         root: Some(&root),
         folder,

@@ -54,7 +54,7 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
             }
         }
         (Listing::Requirements, Format::Text) if arguments.page => {
-            let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
+            let quoted = sources(&library, &pack);
             let meant = |role: &str| {
                 arguments
                     .role
@@ -77,7 +77,7 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
             json!({ "id": monitor.id, "title": monitor.title, "requirements": decides })
         })),
         (Listing::Coverage, format) => {
-            let sources = sources(&library.rules.catalogue, &library.rules.suites, &pack);
+            let sources = sources(&library, &pack);
             let mut text = String::new();
             for role in roles {
                 let all = coverage::coverage(&sources, role);
@@ -169,7 +169,7 @@ fn filtered(arguments: &List, library: &Library, pack: &Pack, role: Role) -> Res
     let Some(filter) = &arguments.filter else {
         return Ok(own);
     };
-    let quoted = sources(&library.rules.catalogue, &library.rules.suites, pack);
+    let quoted = sources(library, pack);
     let mut all = own.clone();
     if arguments.role.is_none() {
         for other in [Role::Agv, Role::MasterControl]
@@ -305,10 +305,10 @@ pub fn explain(arguments: &Explain) -> Result<Exit, Problem> {
     let table = |test: &&Arc<Test>| test.id == id || test.id.split('[').next() == Some(id);
     let cases: Vec<_> = suites.tests.iter().filter(table).collect();
     if let Some(test) = cases.first() {
-        text.push_str(&about_test(test, cases.len()));
+        text.push_str(&about_test(test, cases.len(), &library));
     }
     if let Some(monitor) = suites.monitors.iter().find(|monitor| monitor.id == id) {
-        text.push_str(&about_monitor(monitor));
+        text.push_str(&about_monitor(monitor, &library));
     }
     if let Some(check) = tck_check::find(checks::REGISTRY, id) {
         let _ = writeln!(
@@ -455,12 +455,16 @@ fn about_requirement(requirement: &Requirement, library: &Library, pack: &Pack) 
     if !breaking.is_empty() {
         let _ = writeln!(text, "proved with    {}", breaking.join(", "));
     }
+    for (at, command) in super::explained::repetitions(id, library).iter().enumerate() {
+        let name = if at == 0 { "repeat" } else { "" };
+        let _ = writeln!(text, "{name:<14} {command}");
+    }
     text
 }
 
-fn about_test(test: &Test, cases: usize) -> String {
+fn about_test(test: &Test, cases: usize, library: &Library) -> String {
     let mut text = format!("test {}\n\n{}\n\n{}\n\n", test.id, test.title, test.why.trim());
-    let _ = writeln!(text, "file           {}", test.source.name);
+    let _ = writeln!(text, "file           {}", library.file_of(&test.source));
     let _ = writeln!(text, "for            {}, VDA 5050 {}", test.device, test.spec);
     let _ = writeln!(
         text,
@@ -490,7 +494,7 @@ fn about_test(test: &Test, cases: usize) -> String {
     text
 }
 
-fn about_monitor(monitor: &Monitor) -> String {
+fn about_monitor(monitor: &Monitor, library: &Library) -> String {
     let decides: Vec<&str> = monitor
         .checks
         .iter()
@@ -502,7 +506,7 @@ fn about_monitor(monitor: &Monitor) -> String {
         monitor.title,
         monitor.why.trim()
     );
-    let _ = writeln!(text, "file           {}", monitor.source.name);
+    let _ = writeln!(text, "file           {}", library.file_of(&monitor.source));
     let _ = writeln!(text, "decides        {}", decides.join(", "));
     if let Rule::Check(check) = &monitor.rule
         && let Some(definition) = tck_check::find(checks::REGISTRY, &check.name)

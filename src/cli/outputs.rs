@@ -194,7 +194,7 @@ impl Shown<'_> {
             Rendering::Junit => junit::render(self.result, flavour),
             Rendering::JunitRequirements => junit::by_requirement(self.result, self.sources, flavour),
             Rendering::Markdown => Ok(markdown::summary(self.result, self.sources, self.folder.to_str())),
-            Rendering::CodeQuality => Ok(issues::code_quality(self.result)),
+            Rendering::CodeQuality => Ok(issues::code_quality(self.result, self.sources)),
             Rendering::Sarif => Ok(issues::sarif(self.result, self.sources)),
         }
     }

@@ -61,7 +61,7 @@ pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem
     unchanged(folder)?;
     let pack = super::pack(&library, Some(&result.protocol))?;
     journal.set_names(pack.names());
-    let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
+    let quoted = sources(&library, &pack);
     let root = write_all(
         &Bundle::open(folder),
         &result,
@@ -249,7 +249,7 @@ fn compare_runs(arguments: &Report, folders: &[PathBuf]) -> Result<Exit, Problem
     if arguments.page {
         let library = crate::assets::library(arguments.suites.own())?;
         let pack = super::pack(&library, runs.last().map(|run| run.protocol.as_str()))?;
-        let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
+        let quoted = sources(&library, &pack);
         let page = side_by_side::render(&runs, &names, &quoted);
         super::print(&page.map_err(|error| Problem::Environment(error.to_string()))?)?;
     } else if arguments.format == Format::Json {

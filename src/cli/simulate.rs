@@ -37,7 +37,9 @@ pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
     runtime.block_on(async {
         match &arguments.what {
             Simulated::Agv(device) => agvs(device, &pack, &endpoint, arguments.format).await,
-            Simulated::MasterControl(device) => master_control(device, &pack, &endpoint, arguments.format).await,
+            Simulated::MasterControl(device) => {
+                master_control(device, (&packs, &pack), &endpoint, arguments.format).await
+            }
             Simulated::Site(recording) => site(recording),
         }
     })
@@ -180,13 +182,13 @@ async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint, form
 
 async fn master_control(
     device: &SimulatedMasterControl,
-    pack: &Arc<Pack>,
+    (packs, pack): (&Packs, &Arc<Pack>),
     endpoint: &Endpoint,
     format: Format,
 ) -> Result<Exit, Problem> {
     check_faults(Role::MasterControl, &device.fault)?;
     let mut signals = Signals::listen()?;
-    let mut reference = BuiltIn::from(configured(device, pack)?);
+    let mut reference = BuiltIn::from(configured(device, packs, pack)?);
     tolerate(&mut reference, &device.tolerance)?;
     // Two of them may live at one broker, and whoever comes under the client id of another one throws it out.
     let made_up = || {
@@ -219,31 +221,42 @@ async fn master_control(
 }
 
 /// The master control as the command line wants it.
-fn configured(device: &SimulatedMasterControl, pack: &Pack) -> Result<ReferenceMasterControl, Problem> {
-    let mut like = ReferenceAgv::new(pack);
-    like.subject
-        .topic_template
-        .clone_from(&device.connection.topic_template);
+fn configured(
+    device: &SimulatedMasterControl,
+    packs: &Packs,
+    pack: &Arc<Pack>,
+) -> Result<ReferenceMasterControl, Problem> {
+    let mut layout = None;
     if let Some(file) = &device.layout {
         let name = file.display().to_string();
         let text = std::fs::read_to_string(file)
             .map_err(|error| Diagnostic::whole("unreadable", format!("the layout {name} cannot be read: {error}")))?;
-        like.live_on(Layout::from_lif(
+        layout = Some(Layout::from_lif(
             &Source::new(name, text),
             device.vehicle_type.as_deref(),
         )?);
     }
-    let named = device.vehicle.iter();
-    let names: Vec<(String, String)> = named
-        .map(|vehicle| (vehicle.manufacturer.clone(), vehicle.serial.clone()))
-        .collect();
-    if names.is_empty() && device.layout.is_none() && device.connection.topic_template.is_none() {
-        return Ok(ReferenceMasterControl::new(pack));
-    }
-    let fleet = if names.is_empty() {
-        Fleet::new(&like, "vda5050-tck", &[], tck_simulate::USUAL_FLEET, pack)
-    } else {
-        Fleet::named(&like, &names, pack)
+    let like = |pack: &Pack| {
+        let mut like = ReferenceAgv::new(pack);
+        if let Some(layout) = &layout {
+            like.live_on(layout.clone());
+        }
+        like.subject
+            .topic_template
+            .clone_from(&device.connection.topic_template);
+        like
     };
-    Ok(ReferenceMasterControl::commanding(fleet, like.layout, pack))
+    let mut fleet = Fleet::default();
+    for vehicle in &device.vehicle {
+        let own = match &vehicle.protocol {
+            Some(version) => super::pack_among(packs, Some(version))?,
+            None => Arc::clone(pack),
+        };
+        fleet.join(&like(&own), &vehicle.manufacturer, &vehicle.serial, &own);
+    }
+    let like = like(pack);
+    if fleet.vehicles.is_empty() {
+        fleet = Fleet::new(&like, "vda5050-tck", &[], tck_simulate::USUAL_FLEET, pack);
+    }
+    Ok(ReferenceMasterControl::commanding(fleet, like.layout))
 }

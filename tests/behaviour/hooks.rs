@@ -248,7 +248,7 @@ fn mistakes_in_own_hooks_are_named_with_their_place() {
             .run(&["run", "--virtual", "--suites", "own", "sys/*"])
             .code(2)
             .says(says)
-            .says(&format!("suites/hooks/sys.yaml:{line}:"))
+            .says(&format!("own/hooks/sys.yaml:{line}:"))
             .says("help: ");
     }
 }

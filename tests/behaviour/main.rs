@@ -24,6 +24,7 @@ mod interrupted;
 mod mosquitto;
 mod output;
 mod overhearing;
+mod own_rules;
 mod papers;
 mod pipelines;
 mod planning;

@@ -45,7 +45,7 @@ pub fn certified_within(folder: &Path, budget: Option<Duration>) {
     for entry in finished.recorder.journal().entries() {
         writer.write(&entry.record).unwrap();
     }
-    let quoted = sources(&library.rules.catalogue, &library.rules.suites, &pack);
+    let quoted = sources(&library, &pack);
     let journal = finished.recorder.journal();
     write_all(&bundle, &finished.result, &quoted, journal, Inconclusive::Error).unwrap();
 }

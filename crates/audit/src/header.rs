@@ -26,6 +26,7 @@ pub(super) fn header(
         vehicles.push(MockVehicle {
             manufacturer: manufacturer.to_owned(),
             serial_number: serial_number.to_owned(),
+            protocol: None,
             topics: topics.clone(),
         });
     }

@@ -128,6 +128,17 @@ impl Diagnostic {
         self
     }
 
+    /// Names the file otherwise, if `name` has another name for it.
+    #[must_use]
+    pub fn renamed(mut self, name: &dyn Fn(&str) -> Option<String>) -> Self {
+        if let Some(span) = &mut self.span
+            && let Some(name) = name(&span.source.name)
+        {
+            span.source = Source::new(name, span.source.text.as_str());
+        }
+        self
+    }
+
     /// Only the place with its caret, without title.
     #[must_use]
     pub fn render_place(&self) -> String {

@@ -118,6 +118,30 @@ impl TimeLimits {
         }
     }
 
+    /// These limits with those among the arguments of a check, such as `statePeriod: 5 s`; `None` when there are none among
+    /// them.
+    #[must_use]
+    pub fn with_own(&self, arguments: &Map<String, Value>) -> Option<Self> {
+        let mut named = self.bindings();
+        if self.will.is_none() {
+            named.remove("will");
+        }
+        let mut has_own = false;
+        for name in Self::names() {
+            let own = match arguments.get(name) {
+                Some(Value::String(text)) => parse(text).ok().and_then(|own| u64::try_from(own.as_millis()).ok()),
+                Some(value) => value.as_u64(),
+                None => None,
+            };
+            if let Some(own) = own {
+                named.insert(name.to_owned(), own.into());
+                has_own = true;
+            }
+        }
+        let bindings = Map::from_iter([("time".to_owned(), Value::Object(named))]);
+        has_own.then(|| Self::of_bindings(&bindings))
+    }
+
     /// The names a suite may use after `time.`.
     #[must_use]
     pub fn names() -> Vec<&'static str> {

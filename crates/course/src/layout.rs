@@ -323,6 +323,12 @@ impl Layout {
         self.edges.get(&(start.to_owned(), end.to_owned()))
     }
 
+    /// Whether it has a place for the station of this variable, such as `pick`.
+    #[must_use]
+    pub fn has_station(&self, name: &str) -> bool {
+        self.stations.contains_key(name)
+    }
+
     /// What the source has and the layout leaves out, one sentence each, for the report.
     #[must_use]
     pub fn left_out(&self) -> &[String] {

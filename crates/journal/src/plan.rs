@@ -73,6 +73,9 @@ pub struct MockVehicle {
     pub manufacturer: String,
     /// Serial number, as in its topics and headers.
     pub serial_number: String,
+    /// Protocol version it speaks, where it is another one than that of the run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub protocol: Option<String>,
     /// Full topic by topic name.
     pub topics: std::collections::BTreeMap<String, String>,
 }

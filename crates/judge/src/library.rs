@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::rules::Rules;
-use tck_base::diagnostic::Diagnostic;
+use tck_base::diagnostic::{Diagnostic, Source};
 use tck_check::Check;
 use tck_pack::{Assets, Catalogue, Hooks, Packs, Role};
 use tck_suite::model::Test;
@@ -40,6 +40,14 @@ impl Library {
                 sha256,
             },
         })
+    }
+
+    /// The path of a file of the suites, as whoever has given it wrote it.
+    #[must_use]
+    pub fn file_of(&self, source: &Source) -> String {
+        self.assets
+            .as_given(&source.name)
+            .unwrap_or_else(|| source.name.clone())
     }
 
     /// How many suites of somebody's own there are, such as `own suites: 3 tests, 1 monitor`; nothing without any.

@@ -13,6 +13,7 @@ use super::hidden::Hidden;
 use super::run_contexts::Ground;
 use super::step::shown_path;
 use tck_base::pattern::{Bindings, Bound, Unbound};
+use tck_base::time::TimeLimits;
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_check::{CheckContext, CheckFinding, Running, Shared, find};
 use tck_journal::Entry;
@@ -71,6 +72,8 @@ enum Watching {
         running: Box<dyn Running>,
         listens: Listens,
         with: Map<String, serde_json::Value>,
+        /// The limits, where the monitor has some of its own.
+        time: Option<Box<TimeLimits>>,
     },
     /// Something it needs is not there: judges nothing.
     Off,
@@ -150,10 +153,12 @@ impl MonitorJudge {
                     with.insert(name.clone(), term.bind(bindings)?);
                 }
                 known.world.reads(definition.reads);
+                let time = ground.time.with_own(&with).map(Box::new);
                 Watching::Check {
-                    running: (definition.start)(&context(ground, &with, known)),
+                    running: (definition.start)(&context(ground, &with, time.as_deref(), known)),
                     listens: Listens::to(definition.listens),
                     with,
+                    time,
                 }
             }
         })
@@ -169,11 +174,17 @@ impl MonitorJudge {
         let mut found = Vec::new();
         match &mut self.rule {
             Watching::Off => {}
-            Watching::Check { running, listens, with } => {
+            Watching::Check {
+                running,
+                listens,
+                with,
+                time,
+            } => {
                 if !listens.hears(record.kind()) {
                     return;
                 }
-                if running.observe(record, &context(ground, with, known), &mut found) {
+                let context = context(ground, with, time.as_deref(), known);
+                if running.observe(record, &context, &mut found) {
                     self.judged += 1;
                 }
             }
@@ -242,18 +253,23 @@ impl MonitorJudge {
     /// The run has ended.
     pub fn finish(&mut self, end: &End, ground: &Ground, known: &Knowledge) {
         let mut found = Vec::new();
-        if let Watching::Check { running, with, .. } = &mut self.rule {
-            running.finish(end, &context(ground, with, known), &mut found);
+        if let Watching::Check {
+            running, with, time, ..
+        } = &mut self.rule
+        {
+            running.finish(end, &context(ground, with, time.as_deref(), known), &mut found);
         }
         self.keep(found, ground);
     }
 
     fn keep(&mut self, found: Vec<CheckFinding>, ground: &Ground) {
         for finding in found {
-            let id = finding
-                .requirement
-                .as_ref()
-                .or_else(|| self.monitor.checks.first().map(|binding| &binding.requirement));
+            let own = || self.monitor.checks.first().map(|binding| &binding.requirement);
+            let id = match (&finding.requirement, &self.monitor.instead_of) {
+                (Some(id), Some(replaced)) if *id != replaced.requirement => continue,
+                (_, Some(_)) | (None, None) => own(),
+                (Some(id), None) => Some(id),
+            };
             let Some(id) = id else { continue };
             let Some((requirement, mood)) = mood(&ground.catalogue, &ground.pack, id.as_str()) else {
                 continue;
@@ -365,9 +381,16 @@ fn miss(pattern: &Bound, message: &serde_json::Value, forbidden: bool) -> String
     }
 }
 
-fn context<'a>(ground: &'a Ground, with: &'a Map<String, serde_json::Value>, known: &'a Knowledge) -> CheckContext<'a> {
+fn context<'a>(
+    ground: &'a Ground,
+    with: &'a Map<String, serde_json::Value>,
+    time: Option<&'a TimeLimits>,
+    known: &'a Knowledge,
+) -> CheckContext<'a> {
+    let mut setting = ground.setting();
+    setting.time = time.unwrap_or(setting.time);
     CheckContext {
-        setting: ground.setting(),
+        setting,
         with,
         world: &known.world,
         shared: &known.shared,

@@ -171,9 +171,9 @@ impl MonitorSet {
         let place = timeline.place(entry);
         match place {
             Some(place) if !self.others.is_empty() => {
-                self.fleet
-                    .borrow_mut()
-                    .note(entry, place.vehicle, &place.name, ground.pack.names());
+                let own = place.vehicle.checked_sub(1).and_then(|at| self.others.get(at));
+                let names = own.map_or(ground, |(ground, _)| ground).pack.names();
+                self.fleet.borrow_mut().note(entry, place.vehicle, &place.name, names);
             }
             Some(_) => {}
             None => self.fleet.borrow_mut().link(entry),
@@ -255,10 +255,11 @@ impl MonitorSet {
     pub fn results(&self) -> Vec<MonitorReport> {
         let mut all: Vec<MonitorReport> = self.first.monitors.iter().map(of).collect();
         for monitor in self.others.iter().flat_map(|(_, watch)| &watch.monitors) {
-            // All vehicles have the same monitors.
             let known = all.iter_mut().find(|known| known.result.id == monitor.monitor().id);
-            if let Some(known) = known {
-                known.absorb(monitor.result(), monitor.judged());
+            match known {
+                Some(known) => known.absorb(monitor.result(), monitor.judged()),
+                // A vehicle of another version may have monitors that the first one has not.
+                None => all.push(of(monitor)),
             }
         }
         all

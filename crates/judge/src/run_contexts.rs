@@ -82,22 +82,23 @@ pub(super) struct RunContexts {
 impl RunContexts {
     /// Reads a header.
     pub fn of(rules: &Rules, header: &RunHeader) -> Result<Self, JudgeError> {
-        let pack = rules
-            .packs
-            .get(&header.protocol)
-            .ok_or_else(|| JudgeError::Version(header.protocol.clone()))?;
+        let pack_of = |version: &String| {
+            let pack = rules.packs.get(version);
+            pack.ok_or_else(|| JudgeError::Version(version.clone()))
+        };
+        let pack = pack_of(&header.protocol)?;
         let role = [Role::Agv, Role::MasterControl]
             .into_iter()
             .find(|role| role.word() == header.role)
             .ok_or_else(|| JudgeError::Role(header.role.clone()))?;
         let bindings = Arc::new(header.bindings.clone());
-        let ground_of = |topics: &BTreeMap<String, String>, manufacturer: &str, serial_number: &str| Ground {
+        let ground_of = |pack: &Arc<Pack>, topics: &BTreeMap<String, String>, identity: (&String, &String)| Ground {
             checks: rules.checks,
             pack: Arc::clone(pack),
             catalogue: Arc::clone(&rules.catalogue),
             topics: topics.clone(),
             role,
-            identity: (manufacturer.to_owned(), serial_number.to_owned()),
+            identity: (identity.0.clone(), identity.1.clone()),
             bindings: Arc::clone(&bindings),
             time: TimeLimits::of_bindings(&bindings),
             hooks: Arc::clone(&rules.hooks),
@@ -106,17 +107,21 @@ impl RunContexts {
             is_interrupted: false,
         };
         // What a master control sends names the vehicle it is for.
-        let mut of_vehicles = header
-            .vehicles
-            .iter()
-            .map(|vehicle| ground_of(&vehicle.topics, &vehicle.manufacturer, &vehicle.serial_number));
-        let ground = of_vehicles
+        let mut vehicles = Vec::with_capacity(header.vehicles.len());
+        for vehicle in &header.vehicles {
+            let own = vehicle.protocol.as_ref().map_or(Ok(pack), pack_of)?;
+            let identity = (&vehicle.manufacturer, &vehicle.serial_number);
+            vehicles.push(ground_of(own, &vehicle.topics, identity));
+        }
+        let mut vehicles = vehicles.into_iter();
+        let device = (&header.manufacturer, &header.serial_number);
+        let ground = vehicles
             .next()
-            .unwrap_or_else(|| ground_of(&header.topics, &header.manufacturer, &header.serial_number));
+            .unwrap_or_else(|| ground_of(pack, &header.topics, device));
         Ok(Self {
             role,
             ground,
-            vehicles: of_vehicles.collect(),
+            vehicles: vehicles.collect(),
         })
     }
 }

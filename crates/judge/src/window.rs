@@ -5,6 +5,7 @@ use serde_json::{Map, Value};
 use super::clause_outcome::{ClauseOutcome, unbound_text};
 use super::eval_context::EvalContext;
 use super::repair::StateRepair;
+use tck_base::time::TimeLimits;
 use tck_base::verdict::Verdict;
 use tck_check::{CheckContext, CheckFinding, Running, Shared, find};
 use tck_journal::Entry;
@@ -20,6 +21,8 @@ pub(super) struct CheckWindow {
     world: World,
     shared: Shared,
     with: Map<String, Value>,
+    /// The limits, where the clause has some of its own.
+    time: Option<Box<TimeLimits>>,
     findings: Vec<CheckFinding>,
     /// The requirements the check names, and those of them that count here.
     decides: &'static [&'static str],
@@ -65,7 +68,8 @@ impl CheckWindow {
         let shared = Shared::default();
         let mut world = World::default();
         world.reads(definition.reads);
-        let running = (definition.start)(&context(scene, &with, &world, &shared));
+        let time = scene.setting().time.with_own(&with).map(Box::new);
+        let running = (definition.start)(&context(scene, (&with, time.as_deref()), &world, &shared));
         Ok(Self {
             running,
             listens: Listens::to(definition.listens),
@@ -73,6 +77,7 @@ impl CheckWindow {
             world,
             shared,
             with,
+            time,
             findings: Vec::new(),
             decides: definition.decides,
             about: Vec::new(),
@@ -113,7 +118,7 @@ impl CheckWindow {
             let shown = meant.as_deref().unwrap_or(next);
             let record = self.observer.see(shown);
             self.world.learn(&record, &scene.setting());
-            let context = context(scene, &self.with, &self.world, &self.shared);
+            let context = context(scene, (&self.with, self.time.as_deref()), &self.world, &self.shared);
             let judged =
                 self.listens.hears(record.kind()) && self.running.observe(&record, &context, &mut self.findings);
             if next.seq() == entry.seq() {
@@ -172,7 +177,7 @@ impl CheckWindow {
         scene: &EvalContext<'_>,
     ) -> Option<(ClauseOutcome, String)> {
         let before = self.findings.len();
-        let context = context(scene, &self.with, &self.world, &self.shared);
+        let context = context(scene, (&self.with, self.time.as_deref()), &self.world, &self.shared);
         self.running
             .finish(&self.observer.end(end), &context, &mut self.findings);
         let here = self.findings.iter().skip(before);
@@ -187,12 +192,14 @@ impl CheckWindow {
 
 fn context<'a>(
     scene: &'a EvalContext<'_>,
-    with: &'a Map<String, Value>,
+    (with, time): (&'a Map<String, Value>, Option<&'a TimeLimits>),
     world: &'a World,
     shared: &'a Shared,
 ) -> CheckContext<'a> {
+    let mut setting = scene.setting();
+    setting.time = time.unwrap_or(setting.time);
     CheckContext {
-        setting: scene.setting(),
+        setting,
         with,
         world,
         shared,
@@ -234,6 +241,7 @@ mod tests {
             world: World::default(),
             shared: Shared::default(),
             with: Map::new(),
+            time: None,
             findings: Vec::new(),
             decides: &[],
             about: Vec::new(),

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
@@ -30,6 +30,8 @@ pub struct Assets {
     modified: bool,
     /// The paths of the files that somebody has given.
     own: Vec<String>,
+    /// The folder they are in.
+    folder: Option<PathBuf>,
 }
 
 impl Assets {
@@ -70,6 +72,7 @@ impl Assets {
         files.extend(self.under("schemas/").cloned());
         let mut assets = Self::new(files);
         assets.own = own;
+        assets.folder = Some(dir.to_owned());
         assets.modified = assets.sha256 != self.sha256;
         let same = |path: &&String| assets.get(path) == self.get(path);
         assets.checked = self.checked.iter().filter(same).cloned().collect();
@@ -97,6 +100,7 @@ impl Assets {
         }
         let mut assets = Self::new(files);
         assets.own = paths;
+        assets.folder = Some(dir.to_owned());
         assets.modified = assets.sha256 != self.sha256;
         let same = |path: &&String| assets.get(path) == self.get(path);
         assets.checked = self.checked.iter().filter(same).cloned().collect();
@@ -136,6 +140,7 @@ impl Assets {
             sha256,
             modified: false,
             own: Vec::new(),
+            folder: None,
         }
     }
 
@@ -155,6 +160,14 @@ impl Assets {
     #[must_use]
     pub fn own(&self) -> &[String] {
         &self.own
+    }
+
+    /// Where whoever has given a file finds it; `None` for what is built in.
+    #[must_use]
+    pub fn as_given(&self, path: &str) -> Option<String> {
+        let folder = self.folder.as_ref().filter(|_| !self.is_checked(path))?;
+        let own = self.own.iter().find(|own| *own == path)?.strip_prefix("suites/")?;
+        Some(folder.join(own).to_string_lossy().replace('\\', "/"))
     }
 
     /// SHA-256 over all paths and texts, in hexadecimal.

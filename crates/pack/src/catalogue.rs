@@ -197,6 +197,9 @@ pub struct Requirement {
     /// Where it is tracked, for a requirement of somebody's own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub link: Option<String>,
+    /// Whether it is somebody's own, and none of the standard.
+    #[serde(skip)]
+    pub is_own: bool,
 }
 
 impl Requirement {
@@ -231,7 +234,12 @@ impl Catalogue {
         let mut chapters = Vec::new();
         for file in assets.under("suites/requirements/") {
             let source = Source::new(file.path.as_str(), file.text.as_str());
-            chapters.extend(catalogue_file::read(&source, &mut problems));
+            let mut chapter = catalogue_file::read(&source, &mut problems);
+            let is_own = !assets.is_checked(&file.path) && assets.own().contains(&file.path);
+            for (_, requirement) in chapter.iter_mut().flat_map(|chapter| &mut chapter.requirements) {
+                requirement.is_own = is_own;
+            }
+            chapters.extend(chapter);
         }
         chapters.sort_by_key(|chapter| chapter.position);
         let mut catalogue = Self {

@@ -100,6 +100,7 @@ impl Reader<'_> {
             because: node.get("because").and_then(|text| self.as_text(text)),
             otherwise: node.get("otherwise").and_then(|text| self.as_text(text)),
             link: node.get("link").and_then(|link| self.link(link)),
+            is_own: false,
         };
         Some((place.span.clone(), requirement))
     }

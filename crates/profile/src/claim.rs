@@ -4,6 +4,7 @@ use std::str::FromStr;
 
 use super::key::{SAMPLE_ACTIONS, STATEMENTS};
 use tck_base::diagnostic;
+use tck_pack::{Hooks, Role};
 
 /// One claim of `device.claims`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -115,6 +116,36 @@ fn statement(name: &str, names: impl Iterator<Item = &'static str> + Clone) -> R
 }
 
 impl Claim {
+    /// Reads a claim that names only hooks a vehicle may do without.
+    ///
+    /// # Errors
+    /// What is wrong, and what to do about it.
+    pub fn read(text: &str, hooks: &Hooks) -> Result<Self, (String, String)> {
+        let claim = text.parse::<Self>()?;
+        let Self::NoHook(name) = &claim else {
+            return Ok(claim);
+        };
+        let optional = hooks.of(Role::Agv).filter(|hook| hook.optional);
+        let names: Vec<&str> = optional.map(|hook| hook.name.as_str()).collect();
+        if names.contains(&name.as_str()) {
+            return Ok(claim);
+        }
+        let only = format!("only these may be missing at a device: {}", names.join(", "));
+        Err(
+            match (
+                hooks.named(name).next(),
+                diagnostic::closest(name, names.iter().copied()),
+            ) {
+                (Some(_), _) => (format!("a device cannot do without `{name}`"), only),
+                (None, Some(close)) => (
+                    format!("there is no hook `{name}`"),
+                    format!("did you mean `{close}`? {only}"),
+                ),
+                (None, None) => (format!("there is no hook `{name}`"), only),
+            },
+        )
+    }
+
     /// Whether both cannot be true.
     #[must_use]
     pub fn contradicts(&self, other: &Self) -> bool {

@@ -1,6 +1,6 @@
 //! All layers merged: the typed profile, the list of effective values, and what contradicts itself.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use super::hook_action::{Hook, HookAction};
@@ -9,7 +9,7 @@ use super::layer::Layer;
 use super::value::Value;
 use super::{
     Bench, Claim, Device, Layout, LayoutSource, Motion, PasswordSource, Profile, SampleAction, SampleActions, Setting,
-    TimeLimits, Vehicles,
+    TimeLimits, VehicleGroup, Vehicles,
 };
 use tck_base::diagnostic::{self, Diagnostic, Span};
 use tck_pack::{Hooks, Role};
@@ -116,6 +116,10 @@ impl Taken<'_> {
         }
     }
 
+    fn others(&self) -> &[VehicleGroup] {
+        self.layer.others.as_ref().map_or(&[], |(others, _)| others)
+    }
+
     fn time(&self) -> TimeLimits {
         let limit = |path: &str| match self.value(path) {
             Some(Value::Duration(duration)) => Some(*duration),
@@ -219,6 +223,7 @@ impl Taken<'_> {
                 manufacturer: self.text("vehicles.manufacturer").unwrap_or_default(),
                 serial_numbers: self.texts("vehicles.serial-numbers").unwrap_or_default(),
                 start_node: self.text("vehicles.start-node"),
+                others: self.others().to_vec(),
             },
             time: self.time(),
             maps: match self.value("maps.files") {
@@ -260,6 +265,22 @@ impl Taken<'_> {
             settings.push(Setting {
                 name: "layout.nodes".to_owned(),
                 value: format!("{} nodes, {} edges", list.nodes.len(), list.edges.len()),
+                origin: origin.to_string(),
+            });
+        }
+        if let Some((others, origin)) = &self.layer.others {
+            let groups = others.iter().map(|group| {
+                let speak = group.protocol.iter().map(|version| format!(" ({version})"));
+                format!(
+                    "{} {}{}",
+                    group.manufacturer,
+                    group.serial_numbers.join(", "),
+                    speak.collect::<String>()
+                )
+            });
+            settings.push(Setting {
+                name: "vehicles.others".to_owned(),
+                value: groups.collect::<Vec<_>>().join("; "),
                 origin: origin.to_string(),
             });
         }
@@ -354,15 +375,6 @@ impl Taken<'_> {
             wrong.push(self.at("device.node-bound", title, "and `stops-between-nodes` says otherwise"));
         }
         for claim in self.claims() {
-            if let Claim::NoHook(name) = &claim
-                && !self.hooks.find(name, Role::Agv).is_some_and(|hook| hook.optional)
-            {
-                let optional = self.hooks.of(Role::Agv).filter(|hook| hook.optional);
-                let names: Vec<&str> = optional.map(|hook| hook.name.as_str()).collect();
-                let title = format!("a device cannot do without `{name}`");
-                let hint = format!("only these may be missing at a device: {}", names.join(", "));
-                wrong.push(self.at("device.claims", title, "the claims").hint(hint));
-            }
             let (Claim::Statement(name) | Claim::NoStatement(name)) = &claim else {
                 continue;
             };
@@ -372,6 +384,23 @@ impl Taken<'_> {
             if said.is_some_and(|said| said != claimed) {
                 let title = format!("`device.claims` and `device.{name}` say the opposite of each other");
                 wrong.push(self.at("device.claims", title, "the claims"));
+            }
+        }
+        let maker = self.text("vehicles.manufacturer").unwrap_or_default();
+        let serials = self.texts("vehicles.serial-numbers").unwrap_or_default();
+        let mut named: BTreeSet<(&str, &str)> =
+            serials.iter().map(|serial| (maker.as_str(), serial.as_str())).collect();
+        for group in self.others() {
+            for serial in &group.serial_numbers {
+                if !named.insert((&group.manufacturer, serial)) {
+                    let title = format!("there are two vehicles {} {serial}", group.manufacturer);
+                    wrong.push(Diagnostic::new(
+                        "contradiction",
+                        group.span.clone(),
+                        title,
+                        "the second one",
+                    ));
+                }
             }
         }
         let role = self.role();

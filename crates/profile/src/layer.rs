@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::hook_action::Hook;
 use super::value::Value;
-use super::{Deviation, KnownFailure, LayoutList};
+use super::{Deviation, KnownFailure, LayoutList, VehicleGroup};
 use tck_base::diagnostic::Span;
 
 /// Where a value came from.
@@ -41,6 +41,7 @@ pub(super) struct Setter {
 pub(super) struct Layer {
     pub values: BTreeMap<&'static str, Setter>,
     pub list: Option<(LayoutList, Origin)>,
+    pub others: Option<(Vec<VehicleGroup>, Origin)>,
     pub hooks: BTreeMap<String, (Hook, Origin)>,
     pub deviations: Vec<(Deviation, Origin)>,
     pub known: Vec<(KnownFailure, Origin)>,
@@ -66,6 +67,7 @@ impl Layer {
         }
         self.values.extend(upper.values);
         self.list = upper.list.or(self.list);
+        self.others = upper.others.or(self.others);
         self.hooks.extend(upper.hooks);
         for (deviation, origin) in upper.deviations {
             self.deviations

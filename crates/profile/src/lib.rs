@@ -253,6 +253,21 @@ pub struct Vehicles {
     pub serial_numbers: Vec<String>,
     /// Where the first one stands at the beginning; the first node of the layout when absent.
     pub start_node: Option<String>,
+    /// Vehicles of other makers and versions beside them.
+    pub others: Vec<VehicleGroup>,
+}
+
+/// `[[vehicles.others]]`: vehicles of one maker that speak one version.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct VehicleGroup {
+    /// Manufacturer, as in their topics and headers.
+    pub manufacturer: String,
+    /// Serial numbers.
+    pub serial_numbers: Vec<String>,
+    /// Protocol version they speak; that of the device when absent.
+    pub protocol: Option<String>,
+    /// Where they are written.
+    pub span: Span,
 }
 
 /// `[layout]`.

@@ -43,7 +43,7 @@ impl Surroundings {
         Some(config.join("vda5050-tck").join("config.toml")).filter(|file| file.is_file())
     }
 
-    fn layer(&self) -> Result<Layer, Vec<Diagnostic>> {
+    fn layer(&self, hooks: &Hooks) -> Result<Layer, Vec<Diagnostic>> {
         let mut layer = Layer::default();
         let mut wrong = Vec::new();
         for (name, text) in &self.environment {
@@ -68,6 +68,7 @@ impl Surroundings {
                 &self.directory,
                 &Origin::Environment,
                 &format!("the environment variable {name}"),
+                hooks,
             ) {
                 Ok(setter) => drop(layer.values.insert(key.path, setter)),
                 Err(diagnostic) => wrong.push(diagnostic),
@@ -77,8 +78,15 @@ impl Surroundings {
     }
 }
 
-fn given(key: &Key, text: &str, folder: &Path, origin: &Origin, what: &str) -> Result<Setter, Diagnostic> {
-    match Value::from_text(key.kind, text, folder) {
+fn given(
+    key: &Key,
+    text: &str,
+    folder: &Path,
+    origin: &Origin,
+    what: &str,
+    hooks: &Hooks,
+) -> Result<Setter, Diagnostic> {
+    match Value::from_text(key.kind, text, folder, hooks) {
         Ok(value) => Ok(Setter {
             value,
             origin: origin.clone(),
@@ -144,6 +152,7 @@ pub fn load(
             &surroundings.directory,
             &Origin::Flag,
             &format!("the flag for `{path}`"),
+            hooks,
         ) {
             Ok(setter) => drop(from_flags.values.insert(key.path, setter)),
             Err(diagnostic) => wrong.push(diagnostic),
@@ -156,7 +165,7 @@ pub fn load(
     ];
     let layers = std::iter::once(defaults(hooks))
         .chain(files.into_iter().flatten().map(|path| file(&path, hooks)))
-        .chain([surroundings.layer(), Ok(from_flags)]);
+        .chain([surroundings.layer(hooks), Ok(from_flags)]);
     let mut merged = Layer::default();
     for layer in layers {
         match layer {

@@ -12,6 +12,7 @@ use super::placeholder::placeholders;
 use super::time;
 use tck_base::diagnostic;
 use tck_base::secrets::Secrets;
+use tck_pack::Hooks;
 
 /// A checked value.
 #[derive(Clone, Debug, PartialEq)]
@@ -96,7 +97,7 @@ pub(super) fn number(value: &DeValue<'_>) -> Option<f64> {
 
 impl Value {
     /// Reads a value of a profile whose folder is `folder`.
-    pub(super) fn from_toml(kind: Kind, value: &DeValue<'_>, folder: &Path) -> Result<Self, Refusal> {
+    pub(super) fn from_toml(kind: Kind, value: &DeValue<'_>, folder: &Path, hooks: &Hooks) -> Result<Self, Refusal> {
         let wrong_type = || Refusal {
             code: "wrong-type",
             label: format!("this is {}", type_name(value)),
@@ -120,16 +121,16 @@ impl Value {
                     };
                     texts.push(text.clone().into_owned());
                 }
-                Self::from_list(kind, texts, folder)
+                Self::from_list(kind, texts, folder, hooks)
             }
             (Kind::Flag | Kind::Files | Kind::Claims | Kind::Names, _) => Err(wrong_type()),
-            (_, DeValue::String(text)) => Self::from_text(kind, text, folder),
+            (_, DeValue::String(text)) => Self::from_text(kind, text, folder, hooks),
             _ => Err(wrong_type()),
         }
     }
 
     /// Reads a value of a flag or an environment variable. Lists are separated by commas.
-    pub(super) fn from_text(kind: Kind, text: &str, folder: &Path) -> Result<Self, Refusal> {
+    pub(super) fn from_text(kind: Kind, text: &str, folder: &Path, hooks: &Hooks) -> Result<Self, Refusal> {
         let text = text.trim();
         if text.is_empty() {
             return Err(Refusal::bad("nothing stands here").hint(format!("expected {}", kind.hint())));
@@ -162,16 +163,16 @@ impl Value {
             Kind::Action(_) => Err(expected("this has to be said in a profile".to_owned())),
             Kind::Command => {
                 let words = shlex::split(text).ok_or_else(|| expected("a quote is left open".to_owned()))?;
-                Self::from_list(kind, words, folder)
+                Self::from_list(kind, words, folder, hooks)
             }
             Kind::Files | Kind::Claims | Kind::Names => {
                 let items = text.split(',').map(|item| item.trim().to_owned()).collect();
-                Self::from_list(kind, items, folder)
+                Self::from_list(kind, items, folder, hooks)
             }
         }
     }
 
-    fn from_list(kind: Kind, items: Vec<String>, folder: &Path) -> Result<Self, Refusal> {
+    fn from_list(kind: Kind, items: Vec<String>, folder: &Path, hooks: &Hooks) -> Result<Self, Refusal> {
         if kind != Kind::Command {
             let empty = items.iter().enumerate().filter(|(_, item)| item.trim().is_empty());
             Refusal::all(
@@ -196,7 +197,7 @@ impl Value {
                 let mut claims: Vec<Claim> = Vec::with_capacity(items.len());
                 let mut wrong = Vec::new();
                 for (at, item) in items.iter().enumerate() {
-                    let claim: Claim = match item.parse() {
+                    let claim = match Claim::read(item, hooks) {
                         Ok(claim) => claim,
                         Err((label, hint)) => {
                             wrong.push(Refusal::bad(label).hint(hint).at(at));
@@ -406,7 +407,7 @@ mod tests {
     use super::*;
 
     fn read(kind: Kind, text: &str) -> Result<Value, Refusal> {
-        Value::from_text(kind, text, Path::new("/site"))
+        Value::from_text(kind, text, Path::new("/site"), &Hooks::default())
     }
 
     #[test]

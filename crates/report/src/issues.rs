@@ -60,7 +60,8 @@ fn profile(result: &RunResult) -> String {
 pub const USUAL_PROFILE: &str = "device.toml";
 
 /// What is wrong with the run itself; then fails and warnings of tests and monitors, in the order of the result.
-fn issues(result: &RunResult) -> Vec<Issue<'_>> {
+fn issues<'r>(result: &'r RunResult, sources: &Sources) -> Vec<Issue<'r>> {
+    let given = |(file, line): (String, usize)| (sources.as_given(&file).to_owned(), line);
     let bad = |verdict: Verdict| matches!(verdict, Verdict::Fail | Verdict::Warning);
     let mut all: Vec<Issue<'_>> = Vec::new();
     all.extend(statement::trouble(result).map(|message| Issue {
@@ -77,7 +78,7 @@ fn issues(result: &RunResult) -> Vec<Issue<'_>> {
                 requirement: &decision.requirement,
                 verdict: decision.verdict(),
                 message: decision.message.clone(),
-                place: place(&decision.place),
+                place: given(place(&decision.place)),
                 by: &test.id,
                 of_run: false,
             });
@@ -89,7 +90,7 @@ fn issues(result: &RunResult) -> Vec<Issue<'_>> {
                 requirement: &found.requirement,
                 verdict: found.verdict,
                 message: format!("{} ({} ×)", found.message, found.count),
-                place: (format!("suites/monitors/{}.yaml", monitor.id), 1),
+                place: given((format!("suites/monitors/{}.yaml", monitor.id), 1)),
                 by: &monitor.id,
                 of_run: false,
             });
@@ -108,8 +109,8 @@ fn place(text: &str) -> (String, usize) {
 
 /// GitLab's code quality report.
 #[must_use]
-pub fn code_quality(result: &RunResult) -> String {
-    quality_page(&issues(result))
+pub fn code_quality(result: &RunResult, sources: &Sources) -> String {
+    quality_page(&issues(result, sources))
 }
 
 /// GitLab's code quality report of a run that never came to be.
@@ -174,7 +175,7 @@ fn trouble_issues(trouble: &NoResult) -> Vec<Issue<'_>> {
 #[must_use]
 pub fn sarif(result: &RunResult, sources: &Sources) -> String {
     sarif_log(
-        &issues(result),
+        &issues(result, sources),
         sources,
         &Invocation {
             tool: &result.tool,

@@ -494,9 +494,11 @@ fn requirement_case(
     sources: &Sources,
     how: Inconclusive,
 ) -> TestCase {
-    let asks = sources
-        .requirement(&requirement.id)
-        .map_or("", |known| known.text.as_str());
+    let known = sources.requirement(&requirement.id);
+    let asks = known.map_or("", |known| known.text.as_str());
+    // The schema of Jenkins' xUnit plugin allows a case no properties.
+    let link = known.and_then(|known| known.link.as_deref());
+    let link = link.map_or_else(String::new, |link| format!("\n{link}"));
     // What applies and was not decided is no pass, and what no test can decide is nobody's fault.
     let verdict = match statement::gap(requirement) {
         Some(Gap::NotDecided) => Some(Verdict::Inconclusive),
@@ -508,7 +510,7 @@ fn requirement_case(
         (None, Some(why)) => why.as_str(),
         (None, None) => "no test came to a decision",
     };
-    let by = format!("{asks}\ndecided by {}", requirement.decided_by.join(", "));
+    let by = format!("{asks}{link}\ndecided by {}", requirement.decided_by.join(", "));
     Case {
         name: &format!("{} {asks}", requirement.id),
         class: group,

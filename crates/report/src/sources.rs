@@ -3,6 +3,8 @@
 //! Plain data, so that a rendering needs neither the catalogue nor a loader of suites. Collecting it is left
 //! to the caller; [`TestSource::of`] and [`MonitorSource::of`] do it for the suites' own types.
 
+use std::collections::BTreeMap;
+
 use tck_base::diagnostic::Span;
 use tck_pack::Role;
 use tck_suite::model::{Monitor, Step, Test, Verb};
@@ -16,6 +18,8 @@ pub struct Sources {
     pub tests: Vec<TestSource>,
     /// Monitors.
     pub monitors: Vec<MonitorSource>,
+    /// Files of somebody's own: their paths among the suites, and as they were given.
+    pub given: BTreeMap<String, String>,
 }
 
 impl Sources {
@@ -23,6 +27,12 @@ impl Sources {
     #[must_use]
     pub fn requirement(&self, id: &str) -> Option<&RequirementText> {
         self.requirements.iter().find(|requirement| requirement.id == id)
+    }
+
+    /// The path of a file of the suites where whoever gave it finds it.
+    #[must_use]
+    pub fn as_given<'a>(&'a self, path: &'a str) -> &'a str {
+        self.given.get(path).map_or(path, String::as_str)
     }
 
     /// The test with an id.

@@ -102,7 +102,19 @@ pub fn monitors(result: &RunResult) -> Counts {
 /// Counts of the requirements; `none` is *not decided*.
 #[must_use]
 pub fn requirements(result: &RunResult) -> Counts {
-    Counts::of(result.requirements.iter().map(|requirement| requirement.verdict))
+    counts_of(result.requirements.iter())
+}
+
+fn counts_of<'r>(requirements: impl Iterator<Item = &'r RequirementResult>) -> Counts {
+    Counts::of(requirements.map(|requirement| requirement.verdict))
+}
+
+/// The requirements of the standard.
+fn of_standard(result: &RunResult) -> impl Iterator<Item = &RequirementResult> + Clone {
+    result
+        .requirements
+        .iter()
+        .filter(|requirement| requirement.own.is_none())
 }
 
 /// Why a requirement has no verdict.
@@ -141,8 +153,12 @@ pub struct Gaps {
 /// How many requirements have no verdict, by the reason.
 #[must_use]
 pub fn gaps(result: &RunResult) -> Gaps {
+    gaps_of(result.requirements.iter())
+}
+
+fn gaps_of<'r>(requirements: impl Iterator<Item = &'r RequirementResult>) -> Gaps {
     let mut gaps = Gaps::default();
-    for requirement in &result.requirements {
+    for requirement in requirements {
         match gap(requirement) {
             Some(Gap::NotApplicable) => gaps.not_applicable += 1,
             Some(Gap::NotTestable) => gaps.not_testable += 1,
@@ -189,20 +205,55 @@ pub fn role(result: &RunResult) -> &str {
     }
 }
 
-/// The statement of the run, in one sentence. Device strings in it are clean, but not escaped for a format.
+/// What is said of the requirements of somebody's own, a sentence for each chapter.
+fn own_statements(result: &RunResult) -> String {
+    let mut chapters: Vec<&str> = Vec::new();
+    for chapter in result
+        .requirements
+        .iter()
+        .filter_map(|requirement| requirement.own.as_deref())
+    {
+        if !chapters.contains(&chapter) {
+            chapters.push(chapter);
+        }
+    }
+    let of = |chapter: &str| {
+        let own = result
+            .requirements
+            .iter()
+            .filter(|one| one.own.as_deref() == Some(chapter));
+        let counts = counts_of(own.clone());
+        let applicable = counts.total() - gaps_of(own).not_applicable;
+        let broken = match counts.fail {
+            0 => "none broken".to_owned(),
+            count => format!("{count} broken"),
+        };
+        let asked = many(applicable, "applicable requirement");
+        format!(" {}: {} of {asked} decided, {broken}.", line(chapter), counts.decided())
+    };
+    chapters.into_iter().map(of).collect()
+}
+
+/// The statement of the run: a sentence on the standard, and one on each chapter of requirements of somebody's own. Device
+/// strings in it are clean, but not escaped for a format.
 #[must_use]
 pub fn statement(result: &RunResult) -> String {
     let who = device(result);
-    let counts = requirements(result);
+    let counts = counts_of(of_standard(result));
     let decided = counts.decided();
-    let open = undecided(result);
+    let not_applicable = gaps_of(of_standard(result)).not_applicable;
+    let applicable = counts.total() - not_applicable;
+    let open = applicable - decided;
+    let own_broken = result
+        .requirements
+        .iter()
+        .any(|one| one.own.is_some() && one.verdict == Some(Verdict::Fail));
     let partial = if result.partial { "This run ended early. " } else { "" };
     let standard = format!("VDA 5050 {}", line(&result.protocol));
     let role = match role(result) {
         "AGV" => "an AGV".to_owned(),
         other => format!("a {}", line(other)),
     };
-    let applicable = counts.total() - gaps(result).not_applicable;
     let of_decided = format!("{decided} of {} decided", many(applicable, "applicable requirement"));
     let rest = match open {
         0 => String::new(),
@@ -214,6 +265,9 @@ pub fn statement(result: &RunResult) -> String {
                 "{who} failed: {}, though no requirement of {standard} was found broken; {of_decided}{rest}.",
                 ended(result)
             )
+        }
+        Some(Verdict::Fail) if counts.fail == 0 && own_broken && !program_failed(result) => {
+            format!("{who} broke no binding requirement of {standard} as {role}: {of_decided}{rest}.")
         }
         Some(Verdict::Fail) => {
             let broken = match counts.fail {
@@ -272,12 +326,13 @@ pub fn statement(result: &RunResult) -> String {
         1 => " 1 test is flaky: its repetitions have different verdicts.".to_owned(),
         count => format!(" {count} tests are flaky: their repetitions have different verdicts."),
     };
+    let own_statements = own_statements(result);
     let own = if result.suites_modified {
         "With suites that are not the delivered ones: "
     } else {
         ""
     };
-    format!("{own}{joined}{partial}{sentence}{flaky}")
+    format!("{own}{joined}{partial}{sentence}{own_statements}{flaky}")
 }
 
 /// Whether the program that was started ended by itself.

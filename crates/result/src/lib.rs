@@ -532,6 +532,9 @@ pub struct Given {
 pub struct RequirementResult {
     /// Requirement id.
     pub id: String,
+    /// The title of its chapter, where it is a requirement of somebody's own and none of the standard.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub own: Option<String>,
     /// Join over everything that decided it; absent when nothing did.
     pub verdict: Option<Verdict>,
     /// Tests and monitors that decided it.

@@ -63,6 +63,10 @@ impl Floor {
         let mut wanting: Vec<Wanting> = Vec::new();
         for (role, need, tests) in needs {
             let on = if need.directed { &directed } else { layout };
+            // A station that the profile does not name is missing there, and not on the floor.
+            if need.stations().any(|name| !on.has_station(name)) {
+                continue;
+            }
             let Some((from, of, why)) = held(on, role, need) else {
                 continue;
             };

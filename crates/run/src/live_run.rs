@@ -157,7 +157,7 @@ impl LiveRun {
         place: ProfileContext,
     ) -> Result<Self, Vec<Diagnostic>> {
         let profile = &effective.profile;
-        let mut device = DeviceUnderTest::of_profile(effective, pack, place.vehicles)?;
+        let mut device = DeviceUnderTest::of_profile(effective, &library.rules.packs, pack, place.vehicles)?;
         device.files = files(effective, place.profile.as_deref(), &place.folder);
         let topics = Topics {
             device: device.published(pack),
@@ -250,7 +250,7 @@ impl LiveRun {
             maps: self.maps,
         };
         let retained = match (&self.device.fleet, &self.options.broker) {
-            (Some(fleet), BrokerChoice::External { .. }) => fleet.retained(pack),
+            (Some(fleet), BrokerChoice::External { .. }) => fleet.retained(),
             _ => Vec::new(),
         };
         let subject = self.device.subject.clone();
@@ -303,7 +303,7 @@ impl LiveRun {
         } else {
             Vantage::Subscriber
         };
-        let rests = Rests::of(&self.device, &self.options, pack)?;
+        let rests = Rests::of(&self.device, &self.options)?;
         if let Some(rests) = &rests {
             let cleared = rests.clear().await?;
             if !cleared.is_empty() {
@@ -402,14 +402,14 @@ struct Rests {
 
 impl Rests {
     /// `None` where nothing stays behind: vehicles of others are their own business, and the embedded broker goes with the run.
-    fn of(device: &DeviceUnderTest, options: &BenchOptions, pack: &Pack) -> Result<Option<Self>, LinkError> {
+    fn of(device: &DeviceUnderTest, options: &BenchOptions) -> Result<Option<Self>, LinkError> {
         let (Some(fleet), BrokerChoice::External { url, access }) = (&device.fleet, &options.broker) else {
             return Ok(None);
         };
         Ok(Some(Self {
             broker: Endpoint::parse(url, access)?,
             own: options.own.clone(),
-            leavings: fleet.leavings(pack),
+            leavings: fleet.leavings(),
         }))
     }
 

@@ -2,12 +2,12 @@
 
 use super::bundle::{Bundle, BundleError};
 use tck_journal::Journal;
-use tck_pack::{Catalogue, Decided, Pack};
+use tck_judge::Library;
+use tck_pack::{Decided, Pack};
 use tck_report::junit::Inconclusive;
 use tck_report::sources::{HowDecided, MonitorSource, RequirementText, Sources, TestSource};
 use tck_report::{html, json, junit, manifest};
 use tck_result::RunResult;
-use tck_suite::Suites;
 
 /// Why the outputs could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -31,8 +31,10 @@ pub enum OutputError {
 
 /// What catalogue and suites say, for a protocol version.
 #[must_use]
-pub fn sources(catalogue: &Catalogue, suites: &Suites, pack: &Pack) -> Sources {
-    let requirements = catalogue.all().filter_map(|requirement| {
+pub fn sources(library: &Library, pack: &Pack) -> Sources {
+    let suites = &library.rules.suites;
+    let given = |path: &String| Some((path.clone(), library.assets.as_given(path)?));
+    let requirements = library.rules.catalogue.all().filter_map(|requirement| {
         let note = requirement.in_version(pack)?;
         Some(RequirementText {
             id: requirement.id.as_str().to_owned(),
@@ -61,6 +63,7 @@ pub fn sources(catalogue: &Catalogue, suites: &Suites, pack: &Pack) -> Sources {
         requirements: requirements.collect(),
         tests: tests.map(|test| TestSource::of(test)).collect(),
         monitors: monitors.map(|monitor| MonitorSource::of(monitor)).collect(),
+        given: library.assets.own().iter().filter_map(given).collect(),
     }
 }
 

@@ -18,7 +18,7 @@ use tck_journal::event::{RunHeader, Setting};
 use tck_journal::{Reason, Vantage};
 use tck_judge::Library;
 use tck_pack::Participant;
-use tck_pack::{Pack, Role};
+use tck_pack::{Pack, Packs, Role};
 use tck_profile::{Effective, Profile, TimeLimits};
 use tck_simulate::BuiltIn;
 use tck_simulate::ReferenceAgv;
@@ -83,14 +83,23 @@ impl DeviceUnderTest {
     ///
     /// # Errors
     /// What the profile lacks, or a file that it names and that cannot be read.
-    pub fn of_profile(effective: &Effective, pack: &Pack, vehicles: Option<usize>) -> Result<Self, Vec<Diagnostic>> {
+    pub fn of_profile(
+        effective: &Effective,
+        packs: &Packs,
+        pack: &Pack,
+        vehicles: Option<usize>,
+    ) -> Result<Self, Vec<Diagnostic>> {
         let profile = &effective.profile;
         let device = &profile.device;
         let subject = subject(profile)?;
         let layout = Layout::of_profile(profile)?;
         let fleet = match subject.role {
             Role::Agv => None,
-            Role::MasterControl => Some(fleet(profile, layout.as_ref(), vehicles.unwrap_or(USUAL_FLEET), pack)),
+            Role::MasterControl => {
+                let mut fleet = fleet(profile, layout.as_ref(), vehicles.unwrap_or(USUAL_FLEET), pack);
+                join_others(&mut fleet, profile, layout.as_ref(), (packs, pack))?;
+                Some(fleet)
+            }
         };
         let motion = if fleet.is_some() || profile.motion.allowed {
             // The vehicles of a fleet are the harness's own.
@@ -130,7 +139,7 @@ impl DeviceUnderTest {
     #[must_use]
     pub fn published(&self, pack: &Pack) -> Vec<String> {
         match &self.fleet {
-            Some(fleet) => fleet.commanded(pack),
+            Some(fleet) => fleet.commanded(),
             None => self.subject.published(pack),
         }
     }
@@ -139,7 +148,7 @@ impl DeviceUnderTest {
     #[must_use]
     pub fn told(&self, pack: &Pack) -> Vec<String> {
         match &self.fleet {
-            Some(fleet) => fleet.published(pack),
+            Some(fleet) => fleet.published(),
             None => {
                 let other_side = Participant {
                     role: Role::MasterControl,
@@ -259,14 +268,51 @@ fn subject(profile: &Profile) -> Result<Participant, Vec<Diagnostic>> {
     })
 }
 
-/// The mock AGVs of a profile.
-fn fleet(profile: &Profile, layout: Option<&Layout>, vehicles: usize, pack: &Pack) -> Fleet {
+/// A mock AGV on the floor of a profile.
+fn mock(profile: &Profile, layout: Option<&Layout>, pack: &Pack) -> ReferenceAgv {
     let mut like = ReferenceAgv::new(pack);
     if let Some(layout) = layout {
         like.live_on(layout.clone());
     }
     like.furnish(&profile.device.sample_actions);
     like.subject.topic_template.clone_from(&profile.device.topic_template);
+    like
+}
+
+/// Adds the vehicles of other makers and versions that a profile names.
+fn join_others(
+    fleet: &mut Fleet,
+    profile: &Profile,
+    layout: Option<&Layout>,
+    (packs, pack): (&Packs, &Pack),
+) -> Result<(), Vec<Diagnostic>> {
+    for group in &profile.vehicles.others {
+        let own: &Pack = match &group.protocol {
+            None => pack,
+            Some(version) => packs.get(version).ok_or_else(|| {
+                let known: Vec<String> = packs.all().iter().map(|pack| pack.version.to_string()).collect();
+                let title = format!("there is no protocol version {version}");
+                let diagnostic = Diagnostic::new("unknown-version", group.span.clone(), title, "of these vehicles");
+                vec![diagnostic.hint(format!("known versions: {}", known.join(", ")))]
+            })?,
+        };
+        let like = mock(profile, layout, own);
+        let places: Vec<String> = like.places().into_iter().map(str::to_owned).collect();
+        for serial in &group.serial_numbers {
+            let mut vehicle = like.clone();
+            let place = fleet.vehicles.len() % places.len().max(1);
+            if let Some(place) = places.get(place) {
+                vehicle.config.start_node.clone_from(place);
+            }
+            fleet.join(&vehicle, &group.manufacturer, serial, own);
+        }
+    }
+    Ok(())
+}
+
+/// The mock AGVs of a profile that speak its version.
+fn fleet(profile: &Profile, layout: Option<&Layout>, vehicles: usize, pack: &Pack) -> Fleet {
+    let like = mock(profile, layout, pack);
     let wanted = &profile.vehicles;
     let count = vehicles.max(wanted.serial_numbers.len());
     let mut fleet = Fleet::new(&like, &wanted.manufacturer, &wanted.serial_numbers, count, pack);
@@ -290,4 +336,110 @@ fn map_files(effective: &Effective, by_mock_vehicles: bool) -> Result<Result<Vec
         return Ok(Err(Reason::NoMapFile));
     }
     Ok(Ok(files))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+    use tck_base::clock::{Moment, Stamp};
+    use tck_base::diagnostic::Source;
+    use tck_journal::event::{self, Direction, Event, Record};
+    use tck_journal::{Entry, Payload};
+    use tck_judge::TrafficJudge;
+
+    fn profile(others: &str) -> Effective {
+        let text = format!(
+            "[device]\nrole = \"master-control\"\nmanufacturer = \"ACME\"\nserial-number = \"m\"\n\
+             [vehicles]\nmanufacturer = \"ACME\"\nserial-numbers = [\"a-1\", \"a-2\"]\n{others}"
+        );
+        let hooks = &tck_testing::library().rules.hooks;
+        tck_profile::check(&Source::new("device.toml", text), std::path::Path::new(""), hooks).expect("a profile")
+    }
+
+    const GLOBEX: &str = "[[vehicles.others]]\nmanufacturer = \"Globex\"\nserial-numbers = [\"g-7\"]\nprotocol = ";
+
+    fn mixed() -> Vec<event::MockVehicle> {
+        let packs = &tck_testing::library().rules.packs;
+        let effective = profile(&format!("{GLOBEX}\"2.0\""));
+        let device = DeviceUnderTest::of_profile(&effective, packs, packs.latest(), None).expect("a device");
+        device.fleet.expect("a fleet").mock_vehicles(packs.latest())
+    }
+
+    #[test]
+    fn a_fleet_may_be_of_several_makers_and_versions() {
+        let vehicles = mixed();
+        let names: Vec<_> = vehicles
+            .iter()
+            .map(|one| {
+                (
+                    one.manufacturer.as_str(),
+                    one.serial_number.as_str(),
+                    one.protocol.as_deref(),
+                )
+            })
+            .collect();
+        let expected = [
+            ("ACME", "a-1", None),
+            ("ACME", "a-2", None),
+            ("Globex", "g-7", Some("2.0.0")),
+        ];
+        assert_eq!(names, expected);
+        let packs = &tck_testing::library().rules.packs;
+        let effective = profile(&format!("{GLOBEX}\"1.1\""));
+        let wrong = DeviceUnderTest::of_profile(&effective, packs, packs.latest(), None);
+        let wrong = wrong.expect_err("there is no pack for 1.1");
+        assert!(wrong[0].title.contains("1.1") && wrong[0].span.is_some(), "{wrong:?}");
+    }
+
+    #[test]
+    fn each_vehicle_of_a_fleet_is_spoken_to_in_its_own_version() {
+        let library = tck_testing::library();
+        let vehicles = mixed();
+        let header = RunHeader {
+            role: Role::MasterControl.word().to_owned(),
+            protocol: library.rules.packs.latest().version.to_string(),
+            topics: vehicles[0].topics.clone(),
+            vehicles: vehicles.clone(),
+            vantage: "subscriber".to_owned(),
+            ..RunHeader::default()
+        };
+        let found = |number: usize, version: &str| -> Vec<String> {
+            let at = Stamp {
+                moment: Moment::START,
+                utc: jiff::Timestamp::UNIX_EPOCH,
+            };
+            let record = |seq, event| Record {
+                seq,
+                at,
+                source: event::Source::Link,
+                direction: Some(Direction::FromDevice),
+                event,
+            };
+            let vehicle = &vehicles[number];
+            let message = json!({
+                "headerId": 0, "timestamp": "2026-11-27T00:00:00.00Z", "version": version,
+                "manufacturer": vehicle.manufacturer, "serialNumber": vehicle.serial_number,
+            });
+            let order = Event::Message {
+                topic: vehicle.topics["order"].clone(),
+                qos: 0,
+                retain: false,
+                dup: false,
+                payload: Payload::keep(Bytes::from(message.to_string())),
+            };
+            let begun = Event::RunBegun {
+                header: Box::new(header.clone()),
+            };
+            let only = |monitor: &tck_suite::model::Monitor| monitor.id == "header/version";
+            let mut judge = TrafficJudge::begin(&library.rules, &header, &only).expect("a judge");
+            judge.observe(&Entry::new(record(0, begun)));
+            let found = judge.observe(&Entry::new(record(1, order))).into_iter();
+            found.map(|one| one.finding.requirement).collect()
+        };
+        for (number, right, wrong) in [(0, "2.1.0", "2.0.0"), (2, "2.0.0", "2.1.0")] {
+            assert!(found(number, right).is_empty(), "{number}");
+            assert_eq!(found(number, wrong), ["HDR-04"], "{number}");
+        }
+    }
 }

@@ -151,7 +151,7 @@ pub async fn run_virtually(
         .map_err(|error| LinkError::Setup(error.to_string()))?;
     let options = MemoryOptions {
         device_topics: match device.fleet() {
-            Some(fleet) => fleet.commanded(pack),
+            Some(fleet) => fleet.commanded(),
             None => device.subject().published(pack),
         },
         jitter: request.jitter,

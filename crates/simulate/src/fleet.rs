@@ -16,11 +16,23 @@ pub const USUAL_FLEET: usize = 2;
 /// How the serial number of a mock AGV begins that nobody has named; its number follows.
 const MADE_UP: &str = "mock-";
 
-/// The mock AGVs of a run.
-#[derive(Clone, Debug)]
+/// The mock AGVs of a run, which may speak different protocol versions.
+#[derive(Clone, Debug, Default)]
 pub struct Fleet {
     /// The vehicles; the first one is the one that tests talk about.
     pub vehicles: Vec<ReferenceAgv>,
+    topics: Vec<FleetTopic>,
+}
+
+/// A topic of a vehicle of a fleet.
+#[derive(Clone, Debug)]
+struct FleetTopic {
+    /// The whole topic.
+    full: String,
+    /// The whole topic, with `+` for the serial number.
+    of_any: Option<String>,
+    publisher: Role,
+    is_retained: bool,
 }
 
 impl Fleet {
@@ -28,58 +40,63 @@ impl Fleet {
     /// made up.
     #[must_use]
     pub fn new(like: &ReferenceAgv, manufacturer: &str, serials: &[String], count: usize, pack: &Pack) -> Self {
-        let template = like.subject.topic_template.clone();
-        let places: Vec<&str> = like.places();
-        let vehicles = (0..count.max(1)).map(|number| {
-            let mut vehicle = like.clone();
-            if number >= USUAL_FLEET {
-                // The tests talk about the first two; those beside them speak as often as big fleets do.
-                vehicle.config.state_interval = Duration::from_secs(1);
-                vehicle.config.visualization_interval = None;
-            }
-            let serial = serials
-                .get(number)
-                .cloned()
-                .unwrap_or_else(|| format!("{MADE_UP}{}", number + 1));
-            vehicle.rename(manufacturer, &serial, template.as_deref(), pack);
+        let mut fleet = Self::default();
+        for number in 0..count.max(1) {
+            let serial = serials.get(number).cloned();
+            let serial = serial.unwrap_or_else(|| format!("{MADE_UP}{}", number + 1));
+            fleet.join(like, manufacturer, &serial, pack);
             // The first two stand far from each other, so that neither is in the way.
+            let places = like.places();
             let place = match number {
                 0 => places.first(),
                 1 => places.last(),
                 _ => places.get(number % places.len().max(1)),
             };
-            if let Some(place) = place {
+            if let (Some(vehicle), Some(place)) = (fleet.vehicles.last_mut(), place) {
                 (*place).clone_into(&mut vehicle.config.start_node);
             }
-            vehicle
-        });
-        Self {
-            vehicles: vehicles.collect(),
         }
+        fleet
     }
 
-    /// Vehicles of these manufacturers and serial numbers on the floor of `like`.
-    #[must_use]
-    pub fn named(like: &ReferenceAgv, names: &[(String, String)], pack: &Pack) -> Self {
+    /// Adds a vehicle like this one that speaks the version of this pack. Those behind the first two speak as often as big fleets
+    /// do.
+    pub fn join(&mut self, like: &ReferenceAgv, manufacturer: &str, serial_number: &str, pack: &Pack) {
+        let number = self.vehicles.len();
+        let mut vehicle = like.clone();
+        if number >= USUAL_FLEET {
+            vehicle.config.state_interval = Duration::from_secs(1);
+            vehicle.config.visualization_interval = None;
+        }
         let template = like.subject.topic_template.as_deref();
-        let vehicles = names.iter().map(|(manufacturer, serial)| {
-            let mut vehicle = like.clone();
-            vehicle.rename(manufacturer, serial, template, pack);
-            vehicle
-        });
-        Self {
-            vehicles: vehicles.collect(),
+        vehicle.rename(manufacturer, serial_number, template, pack);
+        let any = Participant {
+            serial_number: "+".to_owned(),
+            ..vehicle.subject.clone()
+        };
+        let mut of_any = any.topics(pack);
+        for (name, full) in &vehicle.config.topics {
+            let Some(rule) = pack.topic(name) else { continue };
+            self.topics.push(FleetTopic {
+                full: full.clone(),
+                of_any: of_any.remove(name),
+                publisher: rule.publisher,
+                is_retained: rule.retain,
+            });
         }
+        self.vehicles.push(vehicle);
     }
 
-    /// As the journal names them.
+    /// As the journal of a run in this version names them.
     #[must_use]
     pub fn mock_vehicles(&self, pack: &Pack) -> Vec<MockVehicle> {
+        let version = pack.version.to_string();
         let all = self.vehicles.iter();
         all.map(|vehicle| MockVehicle {
             manufacturer: vehicle.subject.manufacturer.clone(),
             serial_number: vehicle.subject.serial_number.clone(),
-            topics: vehicle.subject.topics(pack),
+            protocol: Some(vehicle.config.version.clone()).filter(|own| *own != version),
+            topics: vehicle.config.topics.clone(),
         })
         .collect()
     }
@@ -104,44 +121,35 @@ impl Fleet {
 
     /// The topics a master control publishes for these vehicles.
     #[must_use]
-    pub fn commanded(&self, pack: &Pack) -> Vec<String> {
-        let all = self.vehicles.iter().map(|vehicle| Participant {
-            role: Role::MasterControl,
-            ..vehicle.subject.clone()
-        });
-        all.flat_map(|subject| subject.published(pack)).collect()
+    pub fn commanded(&self) -> Vec<String> {
+        self.topics_where(|topic| topic.publisher == Role::MasterControl)
     }
 
     /// The topics these vehicles publish.
     #[must_use]
-    pub fn published(&self, pack: &Pack) -> Vec<String> {
-        let all = self.vehicles.iter();
-        all.flat_map(|vehicle| vehicle.subject.published(pack)).collect()
+    pub fn published(&self) -> Vec<String> {
+        self.topics_where(|topic| topic.publisher == Role::Agv)
     }
 
     /// The topics on which these vehicles leave retained messages.
     #[must_use]
-    pub fn retained(&self, pack: &Pack) -> Vec<String> {
-        let kept = pack.topics().iter().filter(|rule| rule.retain);
-        let kept: Vec<&str> = kept.map(|rule| rule.name.as_str()).collect();
-        let all = self.vehicles.iter().flat_map(|vehicle| {
-            let mut topics = vehicle.subject.topics(pack);
-            kept.iter().filter_map(move |name| topics.remove(*name))
-        });
-        all.collect()
+    pub fn retained(&self) -> Vec<String> {
+        self.topics_where(|topic| topic.is_retained)
+    }
+
+    fn topics_where(&self, wanted: impl Fn(&FleetTopic) -> bool) -> Vec<String> {
+        let all = self.topics.iter().filter(|topic| wanted(topic));
+        all.map(|topic| topic.full.clone()).collect()
     }
 
     /// Where vehicles of the harness may have left retained messages: these, and those of a run that had more of them and never
     /// came to its end.
     #[must_use]
-    pub fn leavings(&self, pack: &Pack) -> Leavings {
-        let any = self.vehicles.iter().map(|vehicle| Participant {
-            serial_number: "+".to_owned(),
-            ..vehicle.subject.clone()
-        });
-        let made_up: BTreeSet<String> = any.flat_map(|any| any.published(pack)).collect();
+    pub fn leavings(&self) -> Leavings {
+        let published = self.topics.iter().filter(|topic| topic.publisher == Role::Agv);
+        let made_up: BTreeSet<String> = published.filter_map(|topic| topic.of_any.clone()).collect();
         Leavings {
-            own: self.published(pack),
+            own: self.published(),
             filters: made_up.into_iter().collect(),
         }
     }
@@ -190,7 +198,7 @@ mod tests {
         let library = tck_testing::library();
         let pack = library.rules.packs.latest();
         let fleet = Fleet::new(&ReferenceAgv::new(pack), "ACME", &["A-1".to_owned()], 2, pack);
-        let leavings = fleet.leavings(pack);
+        let leavings = fleet.leavings();
         let of = |serial: &str, name: &str| pack.fill_topic(pack.topic_template(), "ACME", serial, name);
         for serial in ["A-1", "mock-2", "mock-17"] {
             assert!(leavings.is_own(&of(serial, "connection")), "{serial}");
@@ -199,7 +207,7 @@ mod tests {
             assert!(!leavings.is_own(&of(serial, "connection")), "{serial}");
         }
         assert!(leavings.filters().contains(&of("+", "factsheet")));
-        let retained = fleet.retained(pack);
+        let retained = fleet.retained();
         assert!(retained.contains(&of("A-1", "connection")) && retained.contains(&of("mock-2", "factsheet")));
         assert!(!retained.contains(&of("A-1", "state")), "{retained:?}");
     }

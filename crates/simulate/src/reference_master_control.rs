@@ -50,24 +50,20 @@ impl ReferenceMasterControl {
     pub fn with_vehicles(count: usize, pack: &Pack) -> Self {
         let like = ReferenceAgv::new(pack);
         let fleet = Fleet::new(&like, "vda5050-tck", &[], count, pack);
-        Self::commanding(fleet, like.layout, pack)
+        Self::commanding(fleet, like.layout)
     }
 
     /// One that commands these vehicles on this floor.
     #[must_use]
-    pub fn commanding(fleet: Fleet, layout: Layout, pack: &Pack) -> Self {
+    pub fn commanding(fleet: Fleet, layout: Layout) -> Self {
         let vehicles = fleet.vehicles.iter().map(|vehicle| VehicleConfig {
             manufacturer: vehicle.subject.manufacturer.clone(),
             serial_number: vehicle.subject.serial_number.clone(),
-            topics: vehicle.subject.topics(pack),
+            version: vehicle.config.version.clone(),
+            features: vehicle.config.features.clone(),
+            topics: vehicle.config.topics.clone(),
         });
         let config = MasterControlConfig {
-            version: pack.version.to_string(),
-            features: pack
-                .features()
-                .filter(|(_, on)| *on)
-                .map(|(name, _)| name.to_owned())
-                .collect(),
             vehicles: vehicles.collect(),
             nodes: layout.nodes().map(site_node).collect(),
             edges: layout.edges().map(site_edge).collect(),

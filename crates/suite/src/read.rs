@@ -51,6 +51,7 @@ const MONITOR_KEYS: &[&str] = &[
     "about",
     "check",
     "with",
+    "instead-of",
     "topic",
     "always",
     "when",
@@ -459,6 +460,13 @@ pub(super) fn read_monitor(
     }
     let rule = rule(&fields, &at, problems);
     let recordings = recordings(&fields, rule.as_ref(), problems);
+    let instead_of = fields.get("instead-of", problems).and_then(|node| {
+        let requirement = RequirementId::from(text_of(node, problems)?);
+        Some(Binding {
+            requirement,
+            span: node.span.clone(),
+        })
+    });
     let hides: Vec<&Node> = fields.list("hides", problems).iter().collect();
     let (needs, need_places): (Vec<_>, Vec<_>) = header.needs.into_iter().unzip();
     let monitor = Monitor {
@@ -468,6 +476,7 @@ pub(super) fn read_monitor(
         spec: header.spec?,
         needs,
         checks: bindings,
+        instead_of,
         recordings: recordings?,
         about: about(&fields, problems),
         why: header.why,
@@ -553,8 +562,8 @@ fn rule(fields: &Fields<'_>, at: &Span, problems: &mut Problems) -> Option<Rule>
     }
     let unneeded: &[&str] = match written[0] {
         "check" => &["topic", "when"],
-        "always" => &["with"],
-        _ => &["with", "when"],
+        "always" => &["with", "instead-of"],
+        _ => &["with", "when", "instead-of"],
     };
     for key in unneeded {
         if let Some(name) = fields.key(key) {

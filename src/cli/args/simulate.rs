@@ -119,6 +119,7 @@ const SIMULATE_MASTER_CONTROL_HELP: &str = "\
 Examples:
   vda5050-tck simulate master-control --broker mqtt://127.0.0.1:1883 --hooks 127.0.0.1:8080
   vda5050-tck simulate agv --serial mock-1    a vehicle for it, in another terminal
+  vda5050-tck simulate master-control --vehicle ACME/a-1 --vehicle Globex/g-7@2.0.0
   curl -d '{\"vehicle\": \"mock-1\", \"to\": \"A3\"}' http://127.0.0.1:8080/hooks/dispatch
   curl http://127.0.0.1:8080/                 what can be asked of it
 
@@ -136,7 +137,7 @@ pub struct SimulatedMasterControl {
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:0")]
     pub hooks: String,
     /// A vehicle it commands; may be repeated [default: vda5050-tck/mock-1 and vda5050-tck/mock-2]
-    #[arg(long, value_name = "MANUFACTURER/SERIAL")]
+    #[arg(long, value_name = "MANUFACTURER/SERIAL[@VERSION]")]
     pub vehicle: Vec<VehicleArg>,
     /// The floor, as a LIF file; the floor of the reference AGV unless said
     #[arg(long, value_name = "FILE")]
@@ -159,6 +160,8 @@ pub struct VehicleArg {
     pub manufacturer: String,
     /// Serial number, as in its topics.
     pub serial: String,
+    /// Protocol version it speaks; that of the master control where none is given.
+    pub protocol: Option<String>,
 }
 
 impl FromStr for VehicleArg {
@@ -166,10 +169,16 @@ impl FromStr for VehicleArg {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let level = |text: &str| !text.is_empty() && !text.contains(['/', '+', '#']);
-        match text.split_once('/') {
+        let is_version = |text: &str| text.parse::<tck_pack::Version>().is_ok();
+        let (name, protocol) = match text.rsplit_once('@') {
+            Some((name, version)) if is_version(version) => (name, Some(version.to_owned())),
+            _ => (text, None),
+        };
+        match name.split_once('/') {
             Some((manufacturer, serial)) if level(manufacturer) && level(serial) => Ok(Self {
                 manufacturer: manufacturer.to_owned(),
                 serial: serial.to_owned(),
+                protocol,
             }),
             _ => Err("a vehicle is written like ACME/0001, without further `/`, `+` and `#`".to_owned()),
         }

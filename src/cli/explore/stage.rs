@@ -325,7 +325,7 @@ impl Stage for OnStage {
         }
         let writer = bundle.journal().map_err(environment)?;
         let finished = self.finished(&library, tests, (&run, purpose), Some(writer), self.end(within))?;
-        let quoted = sources(&library.rules.catalogue, &library.rules.suites, &self.pack);
+        let quoted = sources(&library, &self.pack);
         let journal = finished.recorder.journal();
         write_all(&bundle, &finished.result, &quoted, journal, Inconclusive::default()).map_err(environment)?;
         self.kept = Some(bundle.folder().to_owned());

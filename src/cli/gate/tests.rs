@@ -239,6 +239,7 @@ fn case(end: fn() -> End, tests: Vec<TestResult>, around: fn(&mut Case)) -> Case
             .requirements
             .extend(test.decisions.iter().map(|decision| RequirementResult {
                 id: decision.requirement.clone(),
+                own: None,
                 verdict: Some(decision.verdict()),
                 decided_by: vec![test.id.clone()],
                 verdicts: Vec::new(),
@@ -249,6 +250,7 @@ fn case(end: fn() -> End, tests: Vec<TestResult>, around: fn(&mut Case)) -> Case
         .requirements
         .extend(result.monitors.iter().map(|monitor| RequirementResult {
             id: "HDR-01".to_owned(),
+            own: None,
             verdict: monitor.verdict,
             decided_by: vec![monitor.id.clone()],
             verdicts: Vec::new(),

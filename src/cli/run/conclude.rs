@@ -36,7 +36,7 @@ impl Job {
             Ok(packed) => packed.clone_into(&mut result.journal),
             Err(error) => unwritten = Some(error.to_string()),
         }
-        let quoted = sources(&self.library.rules.catalogue, &self.library.rules.suites, &self.pack);
+        let quoted = sources(&self.library, &self.pack);
         let root = write_all(
             bundle,
             &result,

@@ -201,5 +201,6 @@ pub fn sources() -> Sources {
             why: "Without it a lost message cannot be told from one that was never sent.".to_owned(),
             requirements: vec!["HDR-01".to_owned()],
         }],
+        given: std::collections::BTreeMap::new(),
     }
 }

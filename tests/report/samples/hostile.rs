@@ -183,6 +183,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
         requirements: vec![
             RequirementResult {
                 id: evil(),
+                own: None,
                 verdict: Some(Verdict::Fail),
                 decided_by: vec![evil()],
                 verdicts: Vec::new(),
@@ -190,6 +191,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
             },
             RequirementResult {
                 id: "X Y".to_owned(),
+                own: None,
                 verdict: None,
                 decided_by: Vec::new(),
                 verdicts: Vec::new(),
@@ -256,6 +258,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
             why: evil(),
             requirements: vec![evil()],
         }],
+        given: std::collections::BTreeMap::new(),
     };
     (result, record.journal, sources)
 }

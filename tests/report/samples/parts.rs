@@ -107,6 +107,7 @@ pub fn run(tests: Vec<TestResult>, monitors: Vec<MonitorResult>) -> RunResult {
             let passive = (*how == "passive" && found.is_none()).then_some(Verdict::Pass);
             RequirementResult {
                 id: (*id).to_owned(),
+                own: None,
                 verdict: found.and_then(|(verdict, _)| verdict.get()).or(passive),
                 decided_by: match (found, passive) {
                     (Some((_, by)), _) => by.clone(),

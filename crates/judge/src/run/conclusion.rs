@@ -273,11 +273,14 @@ impl RunJudge {
         }
         let mut all = Vec::new();
         for requirement in self.rules.catalogue.all() {
-            if !requirement.role.concerns(self.role) || requirement.in_version(&self.ground.pack).is_none() {
+            let id = requirement.id.as_str();
+            let opinions = decided.remove(id);
+            // What another version asks is listed when a vehicle that speaks it has decided it.
+            let is_asked = requirement.in_version(&self.ground.pack).is_some() || opinions.is_some();
+            if !requirement.role.concerns(self.role) || !is_asked {
                 continue;
             }
-            let id = requirement.id.as_str();
-            let opinions = decided.remove(id).unwrap_or_default();
+            let opinions = opinions.unwrap_or_default();
             let verdict = opinions.verdict();
             let not_decided = match verdict {
                 Some(_) => None,
@@ -285,6 +288,7 @@ impl RunJudge {
             };
             all.push(RequirementResult {
                 id: id.to_owned(),
+                own: requirement.is_own.then(|| requirement.chapter.clone()),
                 verdict,
                 verdicts: opinions.verdicts(),
                 decided_by: opinions.by,

@@ -254,7 +254,9 @@ fn why(error: &ConnectionError, accepted: bool, endpoint: &Endpoint) -> String {
             code @ (ConnectReturnCode::NotAuthorized | ConnectReturnCode::BadUserNamePassword),
         ) => match user {
             Some(user) => format!("it refuses the login of `{user}` ({code:?}); its password may be another one"),
-            None => format!("it lets nobody in without a login ({code:?}); give the user name with `username`"),
+            None => format!(
+                "it lets nobody in without a login ({code:?}); give the user name with `username` in the profile, or with `--username`"
+            ),
         },
         ConnectionError::ConnectionRefused(ConnectReturnCode::BadClientId) => {
             "it does not allow the client id (BadClientId); see `client-id`".to_owned()

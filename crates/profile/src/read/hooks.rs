@@ -70,14 +70,14 @@ impl Reader<'_> {
                     Some(hint),
                 );
             }
-            match Value::from_toml(Kind::Duration, way_value.get_ref(), self.folder) {
+            match Value::from_toml(Kind::Duration, way_value.get_ref(), self.folder, hooks) {
                 Ok(Value::Duration(duration)) => timeout = duration,
                 Ok(_) => {}
                 Err(refusal) => return self.refuse(&format!("`listen` of {what}"), way_value, refusal),
             }
         }
         if let Some(written) = members.get("timeout") {
-            match Value::from_toml(Kind::Duration, written.get_ref(), self.folder) {
+            match Value::from_toml(Kind::Duration, written.get_ref(), self.folder, hooks) {
                 Ok(Value::Duration(duration)) => timeout = duration,
                 Ok(_) => {}
                 Err(refusal) => return self.refuse(&format!("the timeout of {what}"), written, refusal),

@@ -15,7 +15,7 @@ use toml::de::{DeTable, DeValue};
 use super::key::{KEYS, Key, Kind};
 use super::layer::{Layer, Origin, Setter};
 use super::value::{self, Refusal, Value};
-use super::{Deviation, LayoutList};
+use super::{Deviation, LayoutList, VehicleGroup};
 use tck_base::diagnostic::{self, Diagnostic, Source, Span};
 use tck_pack::{Hooks, RequirementId};
 
@@ -158,7 +158,7 @@ impl Reader<'_> {
         for (name, value) in table {
             let path = format!("{section}.{}", name.get_ref());
             if let Some(key) = Key::find(&path) {
-                match Value::from_toml(key.kind, value.get_ref(), self.folder) {
+                match Value::from_toml(key.kind, value.get_ref(), self.folder, self.hooks) {
                     Ok(checked) => {
                         let span = self.span(value.span());
                         let setter = Setter {
@@ -188,6 +188,20 @@ impl Reader<'_> {
                         list.edges.extend(self.edge(item));
                     }
                 }
+            } else if path == "vehicles.others" {
+                let DeValue::Array(items) = value.get_ref() else {
+                    let label = format!("this is {}", value::type_name(value.get_ref()));
+                    self.complain(
+                        "wrong-type",
+                        value.span(),
+                        &format!("`{path}` is a list of tables"),
+                        &label,
+                        None,
+                    );
+                    continue;
+                };
+                let groups = items.iter().filter_map(|item| self.vehicle_group(item)).collect();
+                self.layer.others = Some((groups, self.origin.clone()));
             } else if name.get_ref() == "password" || name.get_ref().ends_with("-password") {
                 let hint = "name an environment variable with `password-env`, or a file with `password-file`";
                 self.complain_masked(
@@ -199,8 +213,10 @@ impl Reader<'_> {
             } else {
                 let prefix = format!("{section}.");
                 let mut known: Vec<&str> = KEYS.iter().filter_map(|key| key.path.strip_prefix(&prefix)).collect();
-                if section == "layout" {
-                    known.extend(["nodes", "edges"]);
+                match section {
+                    "layout" => known.extend(["nodes", "edges"]),
+                    "vehicles" => known.push("others"),
+                    _ => {}
                 }
                 let title = format!("there is no `{}` in `[{section}]`", name.get_ref());
                 self.unknown_key(name.span(), &title, name.get_ref(), &known);
@@ -248,14 +264,39 @@ impl Reader<'_> {
     }
 
     fn text(&mut self, what: &str, value: &Spanned<DeValue<'_>>) -> Option<String> {
-        match Value::from_toml(Kind::Text, value.get_ref(), self.folder) {
-            Ok(Value::Text(text)) => Some(text),
-            Ok(_) => None,
-            Err(refusal) => {
-                self.refuse(what, value, refusal);
-                None
-            }
+        match self.value(Kind::Text, what, value)? {
+            Value::Text(text) => Some(text),
+            _ => None,
         }
+    }
+
+    fn value(&mut self, kind: Kind, what: &str, value: &Spanned<DeValue<'_>>) -> Option<Value> {
+        let read = Value::from_toml(kind, value.get_ref(), self.folder, self.hooks);
+        read.map_err(|refusal| self.refuse(what, value, refusal)).ok()
+    }
+
+    /// An entry of `[[vehicles.others]]`.
+    fn vehicle_group(&mut self, item: &Spanned<DeValue<'_>>) -> Option<VehicleGroup> {
+        const REQUIRED: [&str; 2] = ["manufacturer", "serial-numbers"];
+        const KNOWN: [&str; 3] = ["manufacturer", "serial-numbers", "protocol"];
+        let members = self.members("a group of vehicles", item, &KNOWN, &REQUIRED)?;
+        let manufacturer = members.get("manufacturer")?;
+        let manufacturer = self.value(Kind::Level, "the manufacturer of vehicles", manufacturer);
+        let serials = members.get("serial-numbers")?;
+        let serials = self.value(Kind::Names, "the serial numbers of vehicles", serials);
+        let protocol = match members.get("protocol") {
+            Some(protocol) => Some(self.value(Kind::Version, "the version of vehicles", protocol)?),
+            None => None,
+        };
+        let (Value::Text(manufacturer), Value::Texts(serial_numbers)) = (manufacturer?, serials?) else {
+            return None;
+        };
+        Some(VehicleGroup {
+            manufacturer,
+            serial_numbers,
+            protocol: protocol.as_ref().map(Value::shown),
+            span: self.span(item.span()),
+        })
     }
 
     /// A number within limits; `expected` says which.

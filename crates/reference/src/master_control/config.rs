@@ -13,6 +13,10 @@ pub struct VehicleConfig {
     pub manufacturer: String,
     /// Serial number as in the header.
     pub serial_number: String,
+    /// Protocol version it is spoken to in, as in the header; it comes from the pack.
+    pub version: String,
+    /// Features of this version, by the names the packs use: `mapActions`, `factsheetRequest`, `corridors`.
+    pub features: BTreeSet<String>,
     /// Full topic by topic name. A topic that is missing is neither subscribed nor published.
     pub topics: BTreeMap<String, String>,
 }
@@ -75,10 +79,6 @@ pub struct SiteMap {
 pub struct MasterControlConfig {
     /// Its own name, and MQTT client identifier.
     pub name: String,
-    /// Protocol version as in the header. Empty by default: it comes from the pack.
-    pub version: String,
-    /// Features of the protocol version, by the names the packs use: `mapActions`, `factsheetRequest`, `corridors`.
-    pub features: BTreeSet<String>,
     /// The fleet.
     pub vehicles: Vec<VehicleConfig>,
     /// Nodes of the layout.
@@ -118,8 +118,6 @@ impl Default for MasterControlConfig {
         let (nodes, edges) = floor();
         Self {
             name: "reference-master-control".into(),
-            version: String::new(),
-            features: ["mapActions", "factsheetRequest"].map(String::from).into(),
             vehicles: Vec::new(),
             nodes,
             edges,
@@ -169,12 +167,14 @@ fn floor() -> (Vec<SiteNode>, Vec<SiteEdge>) {
     (corners.iter().map(node).collect(), edges.map(edge).collect())
 }
 
-impl MasterControlConfig {
-    /// Whether the protocol version has a feature.
+impl VehicleConfig {
+    /// Whether the protocol version it is spoken to in has a feature.
     pub(crate) fn has(&self, feature: &str) -> bool {
         self.features.contains(feature)
     }
+}
 
+impl MasterControlConfig {
     /// The node of that id in the layout.
     pub(crate) fn node(&self, id: &str) -> Option<&SiteNode> {
         self.nodes.iter().find(|node| node.id == id)

@@ -106,7 +106,7 @@ impl Site {
     /// Asks for the factsheet once when none is there a while after the vehicle is.
     pub(super) fn miss_factsheet(&mut self, vehicle: &mut Vehicle) {
         let here = vehicle.presence == Presence::Online && vehicle.state.is_some();
-        if vehicle.factsheet.is_some() || !here || !self.config.has("factsheetRequest") {
+        if vehicle.factsheet.is_some() || !here || !vehicle.config.has("factsheetRequest") {
             return;
         }
         let now = self.now.moment;

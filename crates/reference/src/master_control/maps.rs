@@ -18,7 +18,7 @@ impl Site {
     /// Begins to roll a map out.
     pub(crate) fn download_map(&mut self, vehicle: &mut Vehicle, map: SiteMap) {
         let same = |job: &MapJob| (&job.map.map_id, &job.map.map_version) == (&map.map_id, &map.map_version);
-        if vehicle.jobs.iter().any(same) || vehicle.jobs.len() >= MAX_JOBS || !self.config.has("mapActions") {
+        if vehicle.jobs.iter().any(same) || vehicle.jobs.len() >= MAX_JOBS || !vehicle.config.has("mapActions") {
             return;
         }
         let mut done = false;
@@ -52,7 +52,7 @@ impl Site {
         map_id: &str,
         version: &str,
     ) -> Option<String> {
-        if !self.config.has("mapActions") {
+        if !vehicle.config.has("mapActions") {
             return None;
         }
         self.instant(vehicle, kind, &json!({ "mapId": map_id, "mapVersion": version }))
@@ -107,7 +107,7 @@ impl Site {
         running: &Running,
         part: std::ops::Range<usize>,
     ) -> bool {
-        if !self.config.has("mapActions") {
+        if !vehicle.config.has("mapActions") {
             return true;
         }
         let mut ready = true;

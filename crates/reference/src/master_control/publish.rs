@@ -63,7 +63,7 @@ impl Site {
         Map::from_iter([
             ("headerId".to_owned(), json!(id)),
             ("timestamp".to_owned(), json!(self.timestamp())),
-            ("version".to_owned(), json!(self.config.version)),
+            ("version".to_owned(), json!(vehicle.config.version)),
             ("manufacturer".to_owned(), json!(vehicle.config.manufacturer)),
             ("serialNumber".to_owned(), json!(vehicle.config.serial_number)),
         ])

@@ -124,7 +124,7 @@ impl Criteria {
             select(all, &self.patterns)?;
             tests.retain(|test| self.patterns.iter().any(|pattern| matches(pattern, &test.id)));
         }
-        let quoted = || sources(&library.rules.catalogue, &library.rules.suites, pack);
+        let quoted = || sources(library, pack);
         if !self.requirements.is_empty() || !self.chapters.is_empty() {
             let quoted = quoted();
             let mut ids = BTreeSet::new();

@@ -145,7 +145,13 @@ pub(super) fn monitor(
     let (name, patterns) = match &monitor.rule {
         Rule::Check(check) => {
             check.visit_terms(&mut |term| scope.check(term, &packs, linter.problems));
-            let ids: Vec<&RequirementId> = monitor.checks.iter().map(|binding| &binding.requirement).collect();
+            let ids: Vec<&RequirementId> = match &monitor.instead_of {
+                Some(instead_of) => {
+                    linter.instead_of(instead_of, monitor, check);
+                    vec![&instead_of.requirement]
+                }
+                None => monitor.checks.iter().map(|binding| &binding.requirement).collect(),
+            };
             linter.check_use(check, &ids, &packs);
             return;
         }

@@ -22,6 +22,8 @@ pub struct Monitor {
     pub needs: Vec<Need>,
     /// What it decides.
     pub checks: Vec<Binding>,
+    /// The requirement of the standard in whose place it decides one of somebody's own, by the same named check.
+    pub instead_of: Option<Binding>,
     /// Whether and how a recording can be judged by it.
     pub recordings: Recordings,
     /// What must have come by for a requirement to be decided; one that is not listed is decided by anything judged.

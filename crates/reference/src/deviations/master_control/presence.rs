@@ -327,7 +327,7 @@ fn restart_update_ids(vehicle: &mut Vehicle) {
 }
 
 fn ask_factsheet(site: &mut Site, vehicle: &mut Vehicle) {
-    if site.config.has("factsheetRequest") {
+    if vehicle.config.has("factsheetRequest") {
         site.instant(vehicle, "factsheetRequest", &Value::Null);
     }
 }

@@ -30,7 +30,7 @@ records! {
             let message = json!({
                 "headerId": 0,
                 "timestamp": site.timestamp(),
-                "version": site.config.version,
+                "version": vehicle.config.version,
                 "manufacturer": vehicle.config.manufacturer,
                 "serialNumber": vehicle.config.serial_number,
                 "connectionState": "CONNECTIONBROKEN",
@@ -232,9 +232,9 @@ type Topic = fn(&str, &str) -> String;
 
 /// Publishes messages of a topic on another one, by the protocol version and the right topic.
 fn misdirected(name: &'static str, topic: Topic) -> Box<dyn Deviation> {
-    holding((name, topic)).sends(|(name, topic), site, _, out| {
+    holding((name, topic)).sends(|(name, topic), _, vehicle, out| {
         if out.name == *name {
-            out.topic = topic(&site.config.version, &out.topic);
+            out.topic = topic(&vehicle.config.version, &out.topic);
         }
         true
     })

@@ -47,10 +47,11 @@ pub(crate) fn config() -> MasterControlConfig {
     let vehicle = |serial: &str| VehicleConfig {
         manufacturer: "Reference".into(),
         serial_number: serial.into(),
+        version: VERSION.into(),
+        features: ["mapActions", "factsheetRequest"].map(String::from).into(),
         topics: topics(serial),
     };
     MasterControlConfig {
-        version: VERSION.into(),
         vehicles: vec![vehicle("agv-1"), vehicle("agv-2")],
         ..MasterControlConfig::default()
     }
