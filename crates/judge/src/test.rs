@@ -265,7 +265,7 @@ impl TestJudge {
             StepEnd::Refused(why) | StepEnd::Skipped(why) => self.refused(section, &step, why),
             _ => {}
         }
-        if let Verb::Send(send) = &step.verb {
+        if let Verb::Send(send) = &*step.verb {
             let since = self.entries.partition_point(|entry| entry.seq() < begun.0);
             self.sent = sent(send, self.entries[since..].iter(), &self.bindings);
         }
@@ -278,7 +278,7 @@ impl TestJudge {
                 self.base = self.base.max(taken.at().moment);
             }
         }
-        if matches!(step.verb, Verb::Send(_) | Verb::Link(_) | Verb::Operator(_)) {
+        if matches!(*step.verb, Verb::Send(_) | Verb::Link(_) | Verb::Operator(_)) {
             // A stimulus that takes time (a person, a hook) must not eat the time of the reaction.
             self.base = at;
         }
@@ -314,7 +314,7 @@ impl TestJudge {
                 let of_time = match (&clause.holds, &outcome.timing) {
                     (ClauseOutcome::HeldLate, timing) => *timing,
                     (ClauseOutcome::Violated, Some(timing @ Timing::Missed(_)))
-                        if clause.witness.is_none() || matches!(step.verb, Verb::Action(_)) =>
+                        if clause.witness.is_none() || matches!(*step.verb, Verb::Action(_)) =>
                     {
                         Some(*timing)
                     }
@@ -328,7 +328,7 @@ impl TestJudge {
                 self.open.push(Open {
                     clause,
                     path: step.path.clone(),
-                    walks: matches!(step.verb, Verb::Action(_)),
+                    walks: matches!(*step.verb, Verb::Action(_)),
                     ended: entry.seq(),
                     waited,
                     sent: self.sent.clone(),
