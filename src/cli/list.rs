@@ -202,7 +202,7 @@ fn tests(all: &[Arc<Test>], role: Role) -> String {
         }
         for (_, steps) in test.sections() {
             for step in steps {
-                if let Verb::Operator(operator) = &step.verb {
+                if let Verb::Operator(operator) = &*step.verb {
                     notes.push(format!("hook {}", operator.hook));
                 }
             }

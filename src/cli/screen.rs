@@ -80,7 +80,7 @@ impl Screen {
 impl Watcher for Screen {
     fn waiting(&mut self, step: &Step) {
         self.desk.performs(step.title.as_deref());
-        let what = match &step.verb {
+        let what = match &*step.verb {
             Verb::Expect(_) | Verb::Never(_) | Verb::Always(_) | Verb::Action(_) | Verb::Retained(_) => {
                 step.verb_span.text()
             }

@@ -3,9 +3,8 @@
 //! Two recorders may have seen the same message, and what they tell may be out of order. A message that runs ahead of
 //! the count of its topic is held back for a moment, in which those before it may still come.
 
-use std::collections::hash_map::DefaultHasher;
 use std::collections::{BTreeMap, VecDeque};
-use std::hash::{Hash, Hasher};
+use std::hash::BuildHasher as _;
 use std::time::Duration;
 
 use tck_base::clock::Moment;
@@ -19,21 +18,22 @@ const AHEAD: usize = 32;
 
 /// The last messages.
 #[derive(Debug, Default)]
-pub(super) struct Known(VecDeque<u64>);
+pub(super) struct Known {
+    prints: VecDeque<u64>,
+    hash: foldhash::quality::RandomState,
+}
 
 impl Known {
     /// Whether the same bytes came on the same topic before.
     pub fn again(&mut self, topic: &str, payload: &[u8]) -> bool {
-        let mut hasher = DefaultHasher::new();
-        (topic, payload).hash(&mut hasher);
-        let print = hasher.finish();
-        if self.0.contains(&print) {
+        let print = self.hash.hash_one((topic, payload));
+        if self.prints.contains(&print) {
             return true;
         }
-        if self.0.len() == REMEMBERED {
-            self.0.pop_front();
+        if self.prints.len() == REMEMBERED {
+            self.prints.pop_front();
         }
-        self.0.push_back(print);
+        self.prints.push_back(print);
         false
     }
 }

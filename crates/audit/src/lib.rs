@@ -34,7 +34,7 @@ mod topics;
 mod vehicle;
 
 use std::collections::BTreeMap;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use tck_capture::{Message, SourcePosition, Told, Wire, WireEvent};
 use tck_journal::event::Packet;
@@ -213,6 +213,13 @@ impl<'r> Audit<'r> {
         self.messages
     }
 
+    /// A topic of a vehicle that is wanted.
+    fn wanted(&mut self, topic: &str) -> Option<Arc<Named>> {
+        let named = self.topics.know(topic)?;
+        let wanted = self.options.wants_vehicle(&named.manufacturer, &named.serial_number);
+        wanted.then_some(named)
+    }
+
     /// Whose topic this is; `None` for one of no vehicle, or of one that is not wanted.
     #[must_use]
     pub fn address(&self, topic: &str) -> Option<Address> {
@@ -239,7 +246,7 @@ impl<'r> Audit<'r> {
         self.messages = number;
         self.first = self.first.or(message.at);
         self.last = message.at.or(self.last);
-        let Some(named) = self.topics.read(&message.topic) else {
+        let Some(named) = self.topics.know(&message.topic) else {
             self.stray(number, &message);
             return;
         };
@@ -315,10 +322,10 @@ impl<'r> Audit<'r> {
             WireEvent::Packet {
                 packet: Packet::Publish { topic, .. },
                 sent: true,
-            } => self.topics.read(topic),
+            } => self.topics.know(topic),
             _ => None,
         };
-        let wanted = |named: &&Named| self.options.wants_vehicle(&named.manufacturer, &named.serial_number);
+        let wanted = |named: &&Arc<Named>| self.options.wants_vehicle(&named.manufacturer, &named.serial_number);
         let publisher = named.as_ref().filter(wanted).map(|named| Publisher {
             vehicle: named.key.clone(),
             topic: &named.name,

@@ -5,6 +5,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
 use super::result::{AuditResult, Recording};
+use super::topics::Named;
 use super::{Address, Audit, AuditError, Options};
 use tck_capture::{Message, Told, Wire, WireEvent};
 use tck_journal::event::Packet;
@@ -76,7 +77,7 @@ impl WorkerPool<'_> {
                     WireEvent::Packet {
                         packet: Packet::Publish { topic, .. },
                         sent: true,
-                    } => self.desk.address(topic).map(|address| self.owner(&address)),
+                    } => self.desk.wanted(topic).map(|named| self.owner(&named)),
                     _ => None,
                 };
                 for (at, hand) in self.hands.iter_mut().enumerate() {
@@ -97,21 +98,21 @@ impl WorkerPool<'_> {
         desk.messages += 1;
         desk.first = desk.first.or(message.at);
         desk.last = message.at.or(desk.last);
-        let Some(address) = desk.address(&message.topic) else {
+        let Some(named) = desk.wanted(&message.topic) else {
             desk.stray(desk.messages, &message);
             return;
         };
         let number = desk.messages;
-        let owner = self.owner(&address);
+        let owner = self.owner(&named);
         if let Some(hand) = self.hands.get_mut(owner) {
             hand.take(Job::Message(number, message));
         }
     }
 
     /// Which of the threads judges a vehicle.
-    fn owner(&self, address: &Address) -> usize {
+    fn owner(&self, named: &Named) -> usize {
         let mut hasher = DefaultHasher::new();
-        address.vehicle.hash(&mut hasher);
+        named.key.hash(&mut hasher);
         usize::try_from(hasher.finish() % self.hands.len().max(1) as u64).unwrap_or_default()
     }
 }

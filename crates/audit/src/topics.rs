@@ -1,7 +1,8 @@
 //! Which vehicle a topic belongs to.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::Range;
+use std::sync::Arc;
 
 use regex::{Captures, Regex};
 
@@ -65,7 +66,12 @@ fn level(found: &Captures<'_>, part: &str) -> String {
 pub(super) struct Topics {
     form: Regex,
     names: BTreeSet<String>,
+    /// Topics that were read before.
+    known: HashMap<String, Option<Arc<Named>>>,
 }
+
+/// How many topics are known again without being read.
+const KNOWN: usize = 65_536;
 
 /// Any interface name; the levels that are suggested otherwise.
 const USUAL: &str = "{interface}/v{majorVersion}/{manufacturer}/{serialNumber}/{topic}";
@@ -99,6 +105,7 @@ impl Topics {
         Ok(Self {
             form: Regex::new(&format!("^{form}$")).map_err(|_| wrong())?,
             names: names.map(|rule| rule.name.as_str().to_owned()).collect(),
+            known: HashMap::new(),
         })
     }
 
@@ -139,6 +146,19 @@ impl Topics {
             differs_in_spelling: same.is_some(),
             meant: same.or_else(near)?.clone(),
         })
+    }
+
+    /// Reads a topic unless it is known; `None` when it is none of the protocol.
+    pub fn know(&mut self, topic: &str) -> Option<Arc<Named>> {
+        if let Some(known) = self.known.get(topic) {
+            return known.clone();
+        }
+        if self.known.len() >= KNOWN {
+            self.known.clear();
+        }
+        let named = self.read(topic).map(Arc::new);
+        self.known.insert(topic.to_owned(), named.clone());
+        named
     }
 
     /// Reads a topic; `None` when it is none of the protocol.

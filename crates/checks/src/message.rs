@@ -165,19 +165,20 @@ impl Schema {
 
     /// Optional members that are known ones but for their spelling; those that are missing by it were named with that.
     fn misspelled(&self, topic: &str, value: &Value, seq: u64, findings: &mut Vec<CheckFinding>) {
+        let whole = Inside {
+            value,
+            places: [None; DEEPEST],
+        };
         if let Some(known) = self.members.get(topic) {
-            odd_members(vec![(topic.to_owned(), value)], known, seq, findings);
+            odd_members(topic, &[], vec![whole], known, seq, findings);
         }
         for Inner { path, members, .. } in self.inner.iter().filter(|inner| inner.topic.as_str() == topic) {
-            let mut inside = vec![(topic.to_owned(), value)];
-            for name in path {
-                inside = inside
-                    .into_iter()
-                    .flat_map(|(place, value)| inner(&place, value, name))
-                    .take(INSIDE)
-                    .collect();
+            let mut inside = vec![whole];
+            for (level, name) in path.iter().enumerate() {
+                let all = inside.iter().flat_map(|one| one.inner(level, name));
+                inside = all.take(INSIDE).collect();
             }
-            odd_members(inside, members, seq, findings);
+            odd_members(topic, path, inside, members, seq, findings);
         }
     }
 }
@@ -207,29 +208,69 @@ const INNER: [(Topic, &[Field]); 16] = [
 /// How many of them are looked at.
 const INSIDE: usize = 512;
 
-fn inner<'v>(place: &str, value: &'v Value, name: &str) -> Vec<(String, &'v Value)> {
-    match value.get(name) {
-        Some(Value::Array(list)) => {
-            let all = list.iter().take(INSIDE).enumerate();
-            all.map(|(at, one)| (format!("{place}/{name}/{at}"), one)).collect()
+/// How many names lead to the deepest of them, at most.
+const DEEPEST: usize = 6;
+
+/// What is inside of a message, and its place in each list on the way to it.
+#[derive(Clone, Copy)]
+struct Inside<'v> {
+    value: &'v Value,
+    places: [Option<usize>; DEEPEST],
+}
+
+impl<'v> Inside<'v> {
+    /// What goes by a name inside of this: the elements of a list, or the one that stands there.
+    fn inner(&self, level: usize, name: &str) -> impl Iterator<Item = Self> + use<'v> {
+        let mut places = self.places;
+        let found = self.value.get(name);
+        let (list, one) = match found {
+            Some(Value::Array(list)) => (list.as_slice(), None),
+            one => (&[][..], one),
+        };
+        let elements = list.iter().take(INSIDE).enumerate();
+        let elements = elements.map(move |(at, value)| {
+            if let Some(place) = places.get_mut(level) {
+                *place = Some(at);
+            }
+            Self { value, places }
+        });
+        elements.chain(one.map(|value| Self { value, places }))
+    }
+
+    /// Where it stands.
+    fn place(&self, topic: &str, path: &[String]) -> String {
+        let mut place = topic.to_owned();
+        for (name, at) in path.iter().zip(self.places) {
+            let _ = write!(place, "/{name}");
+            if let Some(at) = at {
+                let _ = write!(place, "/{at}");
+            }
         }
-        Some(one) => vec![(format!("{place}/{name}"), one)],
-        None => Vec::new(),
+        place
     }
 }
 
 /// Members of these objects that are known ones but for their spelling. Where the right one stands beside it, it is one of the
 /// vendor's own.
-fn odd_members(objects: Vec<(String, &Value)>, known: &[String], seq: u64, findings: &mut Vec<CheckFinding>) {
+fn odd_members(
+    topic: &str,
+    path: &[String],
+    objects: Vec<Inside<'_>>,
+    known: &[String],
+    seq: u64,
+    findings: &mut Vec<CheckFinding>,
+) {
     // The same mistake is made everywhere; once is enough.
     let mut said = BTreeSet::new();
-    for (place, value) in objects {
+    for inside in objects {
+        let value = inside.value;
         let odd = value.as_object().into_iter().flatten().map(|(name, _)| name);
         for name in odd.filter(|name| name.len() < 64 && !known.contains(name)).take(16) {
             let meant = known.iter().find(|known| plain(known) == plain(name));
             let Some(meant) = meant.filter(|meant| value.get(meant.as_str()).is_none()) else {
                 continue;
             };
+            let place = inside.place(topic, path);
             let is_said = |finding: &CheckFinding| {
                 finding.seq == seq && finding.message.starts_with(&format!("{place}/{meant}: "))
             };

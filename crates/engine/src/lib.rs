@@ -283,7 +283,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
     }
 
     fn is_releasing(&self, step: &Step) -> bool {
-        matches!(&step.verb, Verb::Operator(operator) if self.releases(&operator.hook))
+        matches!(&*step.verb, Verb::Operator(operator) if self.releases(&operator.hook))
     }
 
     /// Whether this test has released the emergency stop already, and the device has shown that since: nobody is asked twice.
@@ -348,7 +348,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
         section: Section,
         watcher: &mut dyn Watcher,
     ) -> Result<StepEnd, EngineError> {
-        match &step.verb {
+        match &*step.verb {
             Verb::Send(send) => {
                 if send.topic == "order" {
                     self.space_orders().await?;

@@ -78,9 +78,9 @@ fn bytes_to_value(bytes: &[u8]) -> Value {
     }
 }
 
-fn value_to_bytes(value: &Value) -> Result<bytes::Bytes, String> {
-    if let Some(text) = value.as_str() {
-        return Ok(bytes::Bytes::copy_from_slice(text.as_bytes()));
+fn value_to_bytes(value: Value) -> Result<bytes::Bytes, String> {
+    if let Value::String(text) = value {
+        return Ok(text.into());
     }
     let text = value
         .get("base64")
@@ -95,7 +95,10 @@ fn value_to_bytes(value: &Value) -> Result<bytes::Bytes, String> {
 impl Serialize for Payload {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
-            Self::Whole(bytes) => bytes_to_value(bytes).serialize(serializer),
+            Self::Whole(bytes) => match std::str::from_utf8(bytes) {
+                Ok(text) => serializer.serialize_str(text),
+                Err(_) => bytes_to_value(bytes).serialize(serializer),
+            },
             Self::Cut { sha256, length, prefix } => {
                 json!({ "sha256": sha256, "length": length, "prefix": bytes_to_value(prefix) }).serialize(serializer)
             }
@@ -106,14 +109,14 @@ impl Serialize for Payload {
 impl<'de> Deserialize<'de> for Payload {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         use serde::de::Error as _;
-        let value = Value::deserialize(deserializer)?;
+        let mut value = Value::deserialize(deserializer)?;
         if let Some(sha256) = value.get("sha256").and_then(Value::as_str) {
             return Ok(Self::Cut {
                 sha256: sha256.to_owned(),
                 length: value.get("length").and_then(Value::as_u64).unwrap_or_default(),
-                prefix: value_to_bytes(value.get("prefix").unwrap_or(&Value::Null)).map_err(D::Error::custom)?,
+                prefix: value_to_bytes(value["prefix"].take()).map_err(D::Error::custom)?,
             });
         }
-        value_to_bytes(&value).map(Self::Whole).map_err(D::Error::custom)
+        value_to_bytes(value).map(Self::Whole).map_err(D::Error::custom)
     }
 }

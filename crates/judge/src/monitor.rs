@@ -20,7 +20,8 @@ use tck_journal::Entry;
 use tck_journal::event::Event;
 use tck_result::{MonitorFinding, MonitorResult};
 use tck_suite::model::{Monitor, Need, Recordings, Rule};
-use tck_world::{End, Listens, Observation, World};
+use tck_view::Topic;
+use tck_world::{End, Listen, Listens, Observation, World};
 
 /// How many occurrences of a finding are kept by number.
 pub(super) const FIRST: usize = 5;
@@ -164,12 +165,31 @@ impl MonitorJudge {
         })
     }
 
-    /// Shows it one record.
-    pub fn observe(&mut self, record: &Observation<'_>, subject: Option<&str>, ground: &Ground, known: &Knowledge) {
+    /// The kinds of records it has to be shown: what its rule is about, and what it awaits.
+    pub(super) fn listens(&self) -> Listens {
+        let rule = match &self.rule {
+            Watching::Pattern { topic, .. } => of_subject(topic),
+            Watching::Check { listens, .. } => *listens,
+            Watching::Off => Listens::default(),
+        };
+        let awaited = self.unseen.iter().map(|awaited| of_subject(&awaited.topic));
+        awaited.fold(rule, Listens::and)
+    }
+
+    /// A test begins.
+    pub(super) fn test_begins(&mut self) {
+        self.broken = None;
+    }
+
+    /// Shows it one record, and says whether it found something.
+    pub fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        subject: Option<&str>,
+        ground: &Ground,
+        known: &Knowledge,
+    ) -> bool {
         let entry = record.entry;
-        if matches!(entry.event(), Event::TestBegun { .. }) {
-            self.broken = None;
-        }
         self.see(entry, subject);
         let mut found = Vec::new();
         match &mut self.rule {
@@ -181,7 +201,7 @@ impl MonitorJudge {
                 time,
             } => {
                 if !listens.hears(record.kind()) {
-                    return;
+                    return false;
                 }
                 let context = context(ground, with, time.as_deref(), known);
                 if running.observe(record, &context, &mut found) {
@@ -197,11 +217,13 @@ impl MonitorJudge {
                 // What was stored before the run is not this run's evidence.
                 let stale = matches!(entry.event(), Event::Message { retain: true, .. });
                 if subject != Some(topic.as_str()) || stale {
-                    return;
+                    return false;
                 }
-                let Some(message) = entry.subject() else { return };
+                let Some(message) = entry.subject() else {
+                    return false;
+                };
                 if when.as_ref().is_some_and(|when| !when.matches(&message, None)) {
-                    return;
+                    return false;
                 }
                 self.judged += 1;
                 if pattern.matches(&message, None) == *forbidden {
@@ -214,7 +236,9 @@ impl MonitorJudge {
                 }
             }
         }
+        let has_found = !found.is_empty();
         self.keep(found, ground);
+        has_found
     }
 
     /// Notes what came by of what requirements are about.
@@ -313,6 +337,11 @@ impl MonitorJudge {
         }
     }
 
+    /// How many entries it has judged.
+    pub(super) fn count(&self) -> u64 {
+        self.judged
+    }
+
     /// What it has to say.
     pub fn result(&self) -> MonitorResult {
         let mut verdict: Accumulated = self.findings.iter().map(|finding| finding.verdict).collect();
@@ -364,6 +393,15 @@ impl MonitorJudge {
     pub fn monitor(&self) -> &Arc<Monitor> {
         &self.monitor
     }
+}
+
+/// The kinds of records with this subject that are not stale.
+fn of_subject(subject: &str) -> Listens {
+    if subject.contains(['/', '@']) {
+        return Listens::to(&[Listen::Everything]);
+    }
+    let topic = Topic::of_name(subject);
+    Listens::to(&[Listen::Delivered(topic), Listen::Sent(topic)])
 }
 
 fn miss(pattern: &Bound, message: &serde_json::Value, forbidden: bool) -> String {

@@ -5,6 +5,7 @@
 //! CONNECT packet, is shown to the monitors of the first one only.
 
 use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -20,7 +21,7 @@ use tck_journal::Entry;
 use tck_journal::event::{Event, Packet};
 use tck_result::{MonitorFinding, MonitorResult};
 use tck_suite::model::Monitor;
-use tck_world::{FleetSeen, Observer, World};
+use tck_world::{FleetSeen, Listens, Observer, World};
 
 /// Something a monitor found.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,6 +44,10 @@ pub(super) struct MonitorSet {
 /// The monitors of one vehicle.
 struct MonitorGroup {
     monitors: Vec<MonitorJudge>,
+    /// What each of them has to be shown: to read these is all that most records cost.
+    listens: Vec<Listens>,
+    /// Whether something was found since it was taken last.
+    has_found: bool,
     observer: Observer,
     known: Knowledge,
 }
@@ -55,10 +60,13 @@ impl MonitorGroup {
             shared: Shared::default(),
         };
         let all = monitors.iter();
+        let monitors: Vec<MonitorJudge> = all
+            .filter_map(|monitor| MonitorJudge::start(monitor, ground, &bindings, tap, &mut known))
+            .collect();
         Self {
-            monitors: all
-                .filter_map(|monitor| MonitorJudge::start(monitor, ground, &bindings, tap, &mut known))
-                .collect(),
+            listens: monitors.iter().map(MonitorJudge::listens).collect(),
+            has_found: false,
+            monitors,
             observer: Observer::new(&ground.topics, &ground.pack, ground.role),
             known,
         }
@@ -67,13 +75,20 @@ impl MonitorGroup {
     fn observe(&mut self, entry: &Entry, subject: Option<&str>, ground: &Ground) {
         let record = self.observer.see(entry);
         self.known.world.learn(&record, &ground.setting());
-        for monitor in &mut self.monitors {
-            monitor.observe(&record, subject, ground, &self.known);
+        if matches!(entry.event(), Event::TestBegun { .. }) {
+            self.monitors.iter_mut().for_each(MonitorJudge::test_begins);
+        }
+        let kind = record.kind();
+        for (monitor, listens) in self.monitors.iter_mut().zip(&self.listens) {
+            if listens.hears(kind) {
+                self.has_found |= monitor.observe(&record, subject, ground, &self.known);
+            }
         }
     }
 
     fn finish(&mut self, end: Moment, ground: &Ground) {
         let end = self.observer.end(end);
+        self.has_found = true;
         for monitor in &mut self.monitors {
             monitor.finish(&end, ground, &self.known);
         }
@@ -224,9 +239,10 @@ impl MonitorSet {
 
     /// Takes what was found since it was taken last, so that it is kept nowhere else.
     pub fn take(&mut self) -> Vec<Observed> {
-        let others = self.others.iter_mut().flat_map(|(_, watch)| &mut watch.monitors);
-        let all = self.first.monitors.iter_mut().chain(others);
-        let found = all.flat_map(|monitor| {
+        let others = self.others.iter_mut().map(|(_, watch)| watch);
+        let all = std::iter::once(&mut self.first).chain(others);
+        let all = all.filter_map(|watch| std::mem::take(&mut watch.has_found).then_some(&mut watch.monitors));
+        let found = all.flatten().flat_map(|monitor| {
             let id = monitor.monitor().id.clone();
             let taken = monitor.take().into_iter();
             taken.map(move |finding| Observed {
@@ -249,6 +265,16 @@ impl MonitorSet {
                 .map(move |requirement| (requirement, id.clone()))
         });
         judged.collect()
+    }
+
+    /// How many entries each monitor has judged, by its id.
+    pub fn judged(&self) -> BTreeMap<String, u64> {
+        let others = self.others.iter().flat_map(|(_, watch)| &watch.monitors);
+        let mut all = BTreeMap::new();
+        for monitor in self.first.monitors.iter().chain(others) {
+            *all.entry(monitor.monitor().id.clone()).or_default() += monitor.count();
+        }
+        all
     }
 
     /// What was found, monitor by monitor.

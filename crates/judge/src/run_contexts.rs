@@ -1,11 +1,12 @@
 //! What is known before anything happens, from the first record of a journal.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use serde_json::{Map, Value};
 
 use super::rules::{JudgeError, Rules};
+use tck_base::pattern::Bindings;
 use tck_base::time::TimeLimits;
 use tck_check::Check;
 use tck_journal::event::{RunHeader, Waiver};
@@ -29,6 +30,8 @@ pub struct Ground {
     pub identity: (String, String),
     /// `time`, `device`.
     pub bindings: Arc<Map<String, Value>>,
+    /// The factsheet among them, once it was asked for.
+    factsheet: OnceLock<Option<Arc<FactsheetView>>>,
     /// The limits among them.
     pub time: TimeLimits,
     /// What can be done to the device, and what follows from it.
@@ -51,8 +54,20 @@ impl Ground {
     /// The factsheet of the device, where the run knows it.
     #[must_use]
     pub fn factsheet(&self) -> Option<Arc<FactsheetView>> {
-        let message = MessageView::of_value(Topic::Factsheet, self.factsheet_json()?, self.pack.names());
-        message.factsheet().map(Arc::clone)
+        let read = || {
+            let message = MessageView::of_value(Topic::Factsheet, self.factsheet_json()?, self.pack.names());
+            message.factsheet().map(Arc::clone)
+        };
+        self.factsheet.get_or_init(read).clone()
+    }
+
+    /// A variable gets its value for the whole run.
+    pub(super) fn set(&mut self, name: &str, value: Value) {
+        let mut bindings = Bindings::above(vec![Arc::clone(&self.bindings)]);
+        bindings.set(name, value);
+        self.bindings = Arc::new(bindings.to_map());
+        self.factsheet = OnceLock::new();
+        self.time = TimeLimits::of_bindings(&self.bindings);
     }
 
     /// What monitors and facts may know besides the records.
@@ -100,6 +115,7 @@ impl RunContexts {
             role,
             identity: (identity.0.clone(), identity.1.clone()),
             bindings: Arc::clone(&bindings),
+            factsheet: OnceLock::new(),
             time: TimeLimits::of_bindings(&bindings),
             hooks: Arc::clone(&rules.hooks),
             waivers: Vec::new(),

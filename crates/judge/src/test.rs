@@ -286,12 +286,12 @@ impl TestJudge {
         if let Some(why) = self.declined.clone()
             && self
                 .next_waiting(&step)
-                .is_some_and(|next| !matches!(next.verb, Verb::Never(_)))
+                .is_some_and(|next| !matches!(*next.verb, Verb::Never(_)))
             && !is_answer
         {
             self.refused(section, &step, &why);
         }
-        if let Verb::Send(send) = &step.verb {
+        if let Verb::Send(send) = &*step.verb {
             let since = self.entries.partition_point(|entry| entry.seq() < begun.0);
             self.sent = sent(send, self.entries[since..].iter(), &self.bindings);
             let order = self.entries[since..].iter().find(|entry| {
@@ -310,7 +310,7 @@ impl TestJudge {
                 self.base = self.base.max(taken.at().moment);
             }
         }
-        if matches!(step.verb, Verb::Send(_) | Verb::Link(_) | Verb::Operator(_)) {
+        if matches!(*step.verb, Verb::Send(_) | Verb::Link(_) | Verb::Operator(_)) {
             // A stimulus that takes time (a person, a hook) must not eat the time of the reaction.
             self.base = at;
         }
@@ -346,7 +346,7 @@ impl TestJudge {
                 let of_time = match (&clause.holds, &outcome.timing) {
                     (ClauseOutcome::HeldLate, timing) => *timing,
                     (ClauseOutcome::Violated, Some(timing @ Timing::Missed(_)))
-                        if clause.witness.is_none() || matches!(step.verb, Verb::Action(_)) =>
+                        if clause.witness.is_none() || matches!(*step.verb, Verb::Action(_)) =>
                     {
                         Some(*timing)
                     }
@@ -360,7 +360,7 @@ impl TestJudge {
                 self.open.push(Open {
                     clause,
                     path: step.path.clone(),
-                    walks: matches!(step.verb, Verb::Action(_)),
+                    walks: matches!(*step.verb, Verb::Action(_)),
                     ended: entry.seq(),
                     waited,
                     sent: self.sent.clone(),

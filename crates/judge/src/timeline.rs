@@ -7,6 +7,7 @@
 //! in [`OF_SECOND`], and those of further ones are left to the monitors. What the mock AGVs themselves say is filed as
 //! well, so that a test can wait for it.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 use std::time::Duration;
@@ -81,7 +82,7 @@ impl Timeline {
             let begun = Moment::from_micros(end.micros().saturating_sub(*micros));
             self.lags.push((begun, end));
         }
-        let subject = self.subject_of(entry);
+        let subject = self.subject_of(entry).map(Cow::into_owned);
         if !self.own {
             self.pulse.observe(entry, subject.as_deref(), &self.names);
         }
@@ -95,7 +96,7 @@ impl Timeline {
 
     /// Takes in one entry later than it happened, and returns its subject, if it has one.
     pub fn restore(&mut self, entry: &Arc<Entry>) -> Option<String> {
-        let subject = self.subject_of(entry)?;
+        let subject = self.subject_of(entry)?.into_owned();
         let all = self.subjects.entry(subject.clone()).or_default();
         let at = all.partition_point(|known| known.seq() < entry.seq());
         all.insert(at, Arc::clone(entry));
@@ -116,34 +117,34 @@ impl Timeline {
 
     /// The subject of an entry.
     #[must_use]
-    pub fn subject_of(&self, entry: &Entry) -> Option<String> {
+    pub fn subject_of(&self, entry: &Entry) -> Option<Cow<'_, str>> {
         match entry.event() {
             Event::Message { topic, .. } => self.named(topic),
             Event::Sent { topic, .. } if self.own => self.named(topic),
             Event::Packet { packet, .. } if entry.record.direction == Some(Direction::FromDevice) => {
-                let name = match packet {
-                    Packet::Connect { .. } => "connect",
-                    Packet::Publish { .. } => "publish",
-                    Packet::Subscribe { .. } => "subscribe",
-                    Packet::Unsubscribe { .. } => "unsubscribe",
-                    Packet::Disconnect { .. } => "disconnect",
-                    Packet::Pingreq => "pingreq",
+                let subject = match packet {
+                    Packet::Connect { .. } => "mqtt/connect",
+                    Packet::Publish { .. } => "mqtt/publish",
+                    Packet::Subscribe { .. } => "mqtt/subscribe",
+                    Packet::Unsubscribe { .. } => "mqtt/unsubscribe",
+                    Packet::Disconnect { .. } => "mqtt/disconnect",
+                    Packet::Pingreq => "mqtt/pingreq",
                     _ => return None,
                 };
-                Some(format!("mqtt/{name}"))
+                Some(subject.into())
             }
-            Event::Closed { .. } => Some("mqtt/closed".to_owned()),
-            Event::Undecodable { .. } => Some("mqtt/undecodable".to_owned()),
-            Event::Fetched { .. } => Some("http/fetch".to_owned()),
+            Event::Closed { .. } => Some("mqtt/closed".into()),
+            Event::Undecodable { .. } => Some("mqtt/undecodable".into()),
+            Event::Fetched { .. } => Some("http/fetch".into()),
             _ => None,
         }
     }
 
-    fn named(&self, full: &str) -> Option<String> {
+    fn named(&self, full: &str) -> Option<Cow<'_, str>> {
         let place = self.topics.get(full)?;
         match place.vehicle {
-            0 => Some(place.name.clone()),
-            1 => Some(format!("{}{OF_SECOND}", place.name)),
+            0 => Some(place.name.as_str().into()),
+            1 => Some(format!("{}{OF_SECOND}", place.name).into()),
             _ => None,
         }
     }

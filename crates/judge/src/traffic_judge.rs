@@ -96,10 +96,7 @@ impl TrafficJudge {
 
     /// How many entries each monitor has judged, by its id.
     pub fn judged(&self) -> BTreeMap<String, u64> {
-        let results = self.watches.results().into_iter();
-        results
-            .map(|watched| (watched.result.id, watched.result.judged))
-            .collect()
+        self.watches.judged()
     }
 
     /// The requirements of which something was judged, with the monitor.

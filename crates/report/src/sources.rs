@@ -149,7 +149,7 @@ impl TestSource {
         let mut clauses = Vec::new();
         for (_, steps) in test.sections() {
             for step in steps {
-                operator |= matches!(step.verb, Verb::Operator(_));
+                operator |= matches!(*step.verb, Verb::Operator(_));
                 // Steps inlined from a state stand in another file, and decide nothing there.
                 if step.span.source == test.source {
                     clauses.extend(ClauseSource::of(step));
@@ -171,7 +171,7 @@ impl TestSource {
 
 impl ClauseSource {
     fn of(step: &Step) -> Vec<Self> {
-        let spans: Vec<&Span> = match &step.verb {
+        let spans: Vec<&Span> = match &*step.verb {
             Verb::Expect(expect) => {
                 let checks = expect.checks.iter().map(|binding| &binding.span);
                 let asserts = expect.assert.iter().chain(&expect.prefer);
@@ -245,7 +245,7 @@ mod tests {
             title: None,
             spec: None,
             purpose: None,
-            verb,
+            verb: Arc::new(verb),
             owes: false,
             prefers: false,
             verb_span: span.clone(),

@@ -66,7 +66,7 @@ impl Capabilities {
             .sections()
             .into_iter()
             .flat_map(|(_, steps)| steps)
-            .filter_map(|step| match &step.verb {
+            .filter_map(|step| match &*step.verb {
                 Verb::Operator(operator) => Some(Need::Hook(operator.hook.clone())),
                 _ => None,
             });
@@ -83,7 +83,7 @@ impl Capabilities {
             }
         }
         let sends = test.sections().into_iter().flat_map(|(_, steps)| steps);
-        let routes = sends.filter_map(|step| match &step.verb {
+        let routes = sends.filter_map(|step| match &*step.verb {
             Verb::Send(send) => send.route.as_ref(),
             _ => None,
         });
@@ -288,7 +288,7 @@ impl Capabilities {
 /// Whether the device has to get on with a map file of ours; a transfer that fails needs no file that it could read.
 fn serves_a_map_to_read(test: &Test) -> bool {
     let mut steps = test.sections().into_iter().flat_map(|(_, steps)| steps);
-    steps.any(|step| match &step.verb {
+    steps.any(|step| match &*step.verb {
         Verb::Serve(serve) => {
             serve.file.is_none() && matches!(serve.behaviour, ServeBehaviour::Well | ServeBehaviour::Slow)
         }

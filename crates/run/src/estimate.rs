@@ -71,7 +71,7 @@ impl<'a> Estimate<'a> {
     }
 
     fn step(&self, step: &Step) -> Duration {
-        match &step.verb {
+        match &*step.verb {
             Verb::Send(send) => {
                 let nodes = send.route.as_ref().map_or(0, |route| route.base.len());
                 self.edge * u32::try_from(nodes.saturating_sub(1)).unwrap_or(u32::MAX)

@@ -18,7 +18,7 @@ pub(super) fn exceeded(sheet: &FactsheetView, test: &Test) -> Option<Reason> {
         return None;
     }
     let sends = test.sections().into_iter().flat_map(|(_, steps)| steps);
-    let sends = sends.filter_map(|step| match &step.verb {
+    let sends = sends.filter_map(|step| match &*step.verb {
         Verb::Send(send) => Some(send.as_ref()),
         _ => None,
     });

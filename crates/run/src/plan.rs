@@ -243,7 +243,7 @@ fn as_sentence<S: Serializer>(why: &Option<Reason>, serializer: S) -> Result<S::
 
 fn hooks(test: &Test) -> Vec<String> {
     let steps = test.sections().into_iter().flat_map(|(_, steps)| steps);
-    let hooks = steps.filter_map(|step| match &step.verb {
+    let hooks = steps.filter_map(|step| match &*step.verb {
         Verb::Operator(operator) => Some(operator.hook.clone()),
         _ => None,
     });
@@ -253,7 +253,7 @@ fn hooks(test: &Test) -> Vec<String> {
 /// How many edges the orders of a test release.
 fn edges(test: &Test) -> usize {
     let steps = test.sections().into_iter().flat_map(|(_, steps)| steps);
-    let routes = steps.filter_map(|step| match &step.verb {
+    let routes = steps.filter_map(|step| match &*step.verb {
         Verb::Send(send) => send.route.as_ref(),
         _ => None,
     });

@@ -90,7 +90,7 @@ fn risk(test: &Test, hooks: &Hooks) -> Risk {
         worst = worst.max(Risk::Loaded);
     }
     for step in test.sections().into_iter().flat_map(|(_, steps)| steps) {
-        let own = match &step.verb {
+        let own = match &*step.verb {
             Verb::Link(_) => Risk::Connection,
             Verb::Operator(operator) => {
                 let hook = hooks.find(&operator.hook, test.device);

@@ -16,7 +16,7 @@ pub(super) fn course_need(test: &Test) -> CourseNeed {
 }
 
 fn of_step(step: &Step, need: &mut CourseNeed) {
-    if let Verb::Send(send) = &step.verb
+    if let Verb::Send(send) = &*step.verb
         && let Some(route) = &send.route
     {
         let way: Vec<&String> = route.base.iter().chain(&route.horizon).collect();

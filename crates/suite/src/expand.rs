@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use super::fields::Problems;
-use tck_base::diagnostic::{Diagnostic, did_you_mean};
+use tck_base::diagnostic::{Diagnostic, Source, did_you_mean};
 use tck_base::yaml::{self, Kind, Node};
 
 /// Values to fill in, under `case` or `with`.
@@ -31,11 +31,16 @@ impl<'a> Fill<'a> {
 
     /// As [`Fill::apply`], sparing the copy where the text has no variable of this root.
     pub(super) fn apply_to<'n>(&mut self, node: &'n Node, problems: &mut Problems) -> Cow<'n, Node> {
-        if node.span.source.text.contains(&self.opening) {
+        if self.is_in(&node.span.source) {
             Cow::Owned(self.apply(node, problems))
         } else {
             Cow::Borrowed(node)
         }
+    }
+
+    /// Whether a file has variables of this root.
+    pub(super) fn is_in(&self, source: &Source) -> bool {
+        source.text.contains(&self.opening)
     }
 
     /// A copy of `node` with every variable of this root replaced. A text that is one such variable becomes the

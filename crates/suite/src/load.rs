@@ -227,6 +227,7 @@ fn lint_state(
         states,
         inside: vec![name.to_owned()],
         purpose: *purpose,
+        is_plain: false,
         problems: &mut *problems,
     };
     let given = reader.steps(steps, "steps", None);

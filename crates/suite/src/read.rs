@@ -173,12 +173,15 @@ pub(super) fn read_test(
     let written = rows.iter().map(|(name, values)| (Case::Row(name), *values));
     let crossed = cells.iter().map(|cell| (Case::cell(cell), &cell.values[..]));
     let without_cases = without_cases(&fields, &root);
+    let has_with = Fill::new("with", nothing).is_in(source);
     let mut used: BTreeMap<&str, (bool, &Span)> = BTreeMap::new();
     let mut tests = Vec::new();
     for (case, values) in written.chain(crossed) {
         let mut fill = Fill::new("case", values);
-        let filled = fill.apply(&without_cases, problems);
-        let filled = Fill::new("with", nothing).apply_to(&filled, problems);
+        let mut filled = fill.apply(&without_cases, problems);
+        if has_with {
+            filled = Fill::new("with", nothing).apply(&filled, problems);
+        }
         for ((key, value), is_used) in values.iter().zip(&fill.used) {
             // The name of a row need not be used; it has the place of its axis.
             used.entry(key.text().unwrap_or_default())
@@ -323,11 +326,14 @@ impl TestReader<'_> {
             );
         }
         let without_cases = without_cases(fields, root);
+        let has_with = Fill::new("with", &[]).is_in(self.source);
         let mut tests = Vec::new();
         let mut linted = BTreeSet::new();
         for row in &rows {
-            let filled = Fill::new("case", &row.values).apply(&without_cases, problems);
-            let filled = Fill::new("with", &[]).apply_to(&filled, problems);
+            let mut filled = Fill::new("case", &row.values).apply(&without_cases, problems);
+            if has_with {
+                filled = Fill::new("with", &[]).apply(&filled, problems);
+            }
             // The rows differ in what they break, which only the first of each way and length can do wrong.
             let length = row
                 .values
@@ -368,6 +374,7 @@ impl TestReader<'_> {
             states: self.states,
             inside: Vec::new(),
             purpose: None,
+            is_plain: false,
             problems: &mut *problems,
         };
         let mut section = |key: &str| match fields.get(key, reader.problems) {

@@ -1,10 +1,11 @@
 //! The tree of a file, and the states that files may use.
 
-use std::collections::BTreeMap;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use super::fields::Problems;
-use super::model::Purpose;
+use super::model::{Purpose, Verb};
 use tck_base::diagnostic::{Diagnostic, Source, Span};
 use tck_base::yaml::{self, Node};
 
@@ -18,24 +19,41 @@ pub(super) struct State {
 
 /// The states of `suites/states/`, by name. A state whose file is broken is known without what it says.
 #[derive(Default)]
-pub(super) struct States(BTreeMap<String, Option<State>>);
+pub(super) struct States {
+    known: BTreeMap<String, Option<State>>,
+    /// What their steps do, by the node of each: most tests use the same few states, and read their steps once.
+    read: RefCell<HashMap<*const Node, Arc<Verb>>>,
+}
 
 impl States {
     pub(super) fn get(&self, name: &str) -> Option<&State> {
-        self.0.get(name)?.as_ref()
+        self.known.get(name)?.as_ref()
     }
 
     pub(super) fn is_known(&self, name: &str) -> bool {
-        self.0.contains_key(name)
+        self.known.contains_key(name)
     }
 
     pub(super) fn names(&self) -> Vec<&str> {
-        self.0.keys().map(String::as_str).collect()
+        self.known.keys().map(String::as_str).collect()
     }
 
     /// Knows a state; without what it says when its file is broken.
     pub(super) fn insert(&mut self, name: &str, state: Option<State>) {
-        self.0.insert(name.to_owned(), state);
+        self.known.insert(name.to_owned(), state);
+        self.read.get_mut().clear();
+    }
+
+    /// What a step of a state does, where it was read before.
+    pub(super) fn verb(&self, step: &Node) -> Option<Arc<Verb>> {
+        self.read.borrow().get(&std::ptr::from_ref(step)).cloned()
+    }
+
+    /// Keeps what a step of a state does, for the next test that uses it.
+    pub(super) fn keep(&self, step: &Node, verb: &Arc<Verb>) {
+        self.read
+            .borrow_mut()
+            .insert(std::ptr::from_ref(step), Arc::clone(verb));
     }
 }
 

@@ -1,5 +1,8 @@
 //! Reading a list of steps: the verbs that look, and the inlining of states.
 
+use std::borrow::Cow;
+use std::sync::Arc;
+
 use super::expand::Fill;
 use super::fields::{Fields, Problems, text_of, word_of};
 use super::grammar::{time, walk};
@@ -65,6 +68,8 @@ pub(super) struct StepReader<'a> {
     pub(super) inside: Vec<String>,
     /// What the innermost of them that says so is for.
     pub(super) purpose: Option<Purpose>,
+    /// Whether the innermost of them stands there as it is in its file, without values of its user.
+    pub(super) is_plain: bool,
     pub(super) problems: &'a mut Problems,
 }
 
@@ -120,7 +125,7 @@ impl StepReader<'_> {
             self.inline(value, &fields, &path, spec.as_ref(), steps);
             return;
         }
-        let Some(verb) = self.verb(word, value, &fields, &verb_span) else {
+        let Some(verb) = self.shared_verb(node, word, value, &fields, &verb_span) else {
             return;
         };
         let owes = fields.key("owes");
@@ -252,7 +257,10 @@ impl StepReader<'_> {
         }
         self.inside.push(name.to_owned());
         let outer = std::mem::replace(&mut self.purpose, purpose);
+        let is_plain = matches!(filled, Cow::Borrowed(_));
+        let was_plain = std::mem::replace(&mut self.is_plain, is_plain);
         steps.extend(self.steps(&filled, &format!("{path}/{name}"), spec));
+        self.is_plain = was_plain;
         self.purpose = outer;
         self.inside.pop();
     }
@@ -268,6 +276,27 @@ impl StepReader<'_> {
             )
             .hint(format!("give the state `purpose:`, one of {}", words.join(", "))),
         );
+    }
+
+    /// What a step does; of a state that stands there as it is in its file, read once for all tests that use it.
+    fn shared_verb(
+        &mut self,
+        step: &Node,
+        word: &str,
+        value: &Node,
+        fields: &Fields<'_>,
+        at: &Span,
+    ) -> Option<Arc<Verb>> {
+        if let Some(known) = self.is_plain.then(|| self.states.verb(step)).flatten() {
+            return Some(known);
+        }
+        let before = self.problems.len();
+        let verb = Arc::new(self.verb(word, value, fields, at)?);
+        // A mistake is one of each test that uses the state.
+        if self.is_plain && self.problems.len() == before {
+            self.states.keep(step, &verb);
+        }
+        Some(verb)
     }
 
     fn verb(&mut self, word: &str, value: &Node, fields: &Fields<'_>, at: &Span) -> Option<Verb> {

@@ -106,7 +106,7 @@ fn states_are_inlined_with_their_path() {
             "given[0]/idle-on-course[1]/reach[0]"
         ]
     );
-    let Verb::Expect(reached) = &test.given[1].verb else {
+    let Verb::Expect(reached) = &*test.given[1].verb else {
         panic!()
     };
     assert_eq!(reached.from, From::Latest);
@@ -179,7 +179,7 @@ fn every_row_of_a_table_is_a_test_with_its_values() {
     let test = test_of(&suites, "order/malformed[negative-update]");
     assert_eq!(test.title, "An order that is of a negative update is not taken over");
     assert_eq!(test.group, "order");
-    let Verb::Send(send) = &test.steps[0].verb else {
+    let Verb::Send(send) = &*test.steps[0].verb else {
         panic!()
     };
     let Some(model::Patch::Merge(patch)) = &send.patch else {
@@ -214,7 +214,7 @@ fn requirements_are_bound_to_the_clause_that_decides_them() {
             "ORD-REJ-11 steps[6].until",
         ]
     );
-    let Verb::Always(always) = &test.steps[6].verb else {
+    let Verb::Always(always) = &*test.steps[6].verb else {
         panic!()
     };
     let Extent::Until(until) = &always.extent else { panic!() };
@@ -225,7 +225,7 @@ fn requirements_are_bound_to_the_clause_that_decides_them() {
 fn routes_actions_and_faults_arrive_in_the_model() {
     let suites = loaded();
     let test = test_of(&suites, "order/edge-actions");
-    let Verb::Send(send) = &test.steps[0].verb else {
+    let Verb::Send(send) = &*test.steps[0].verb else {
         panic!()
     };
     assert_eq!((send.qos, send.retain), (Some(1), true));
@@ -235,9 +235,11 @@ fn routes_actions_and_faults_arrive_in_the_model() {
     assert_eq!(route.actions[0].1[0].name.as_deref(), Some("pick1"));
     assert_eq!(route.actions[1].0, RoutePlace::Edge("a".into(), "b".into()));
     assert!(test.steps[2].spec.is_some());
-    let Verb::Send(raw) = &test.steps[3].verb else { panic!() };
+    let Verb::Send(raw) = &*test.steps[3].verb else {
+        panic!()
+    };
     assert!(matches!(&raw.raw, Some(model::Raw::Bytes(bytes)) if bytes == b"{}"));
-    let Verb::Send(patched) = &test.steps[5].verb else {
+    let Verb::Send(patched) = &*test.steps[5].verb else {
         panic!()
     };
     assert!(matches!(&patched.patch, Some(model::Patch::Operations(term)) if matches!(term.kind, TermKind::List(_))));

@@ -6,7 +6,7 @@ use tck_base::pattern::Term;
 impl Step {
     /// Calls `visit` with every term of this step, in the order they are used.
     pub fn visit_terms<'a>(&'a self, visit: &mut dyn FnMut(&'a Term)) {
-        match &self.verb {
+        match &*self.verb {
             Verb::Send(send) => {
                 if let Some(route) = &send.route {
                     route

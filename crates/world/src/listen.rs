@@ -126,6 +126,12 @@ impl Listens {
         Self(all.iter().fold(0, |bits, one| bits | Self::bits(*one)))
     }
 
+    /// The kinds of both.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
     /// Whether an observation of this kind is in the set.
     #[must_use]
     pub fn hears(self, kind: Kind) -> bool {

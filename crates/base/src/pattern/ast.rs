@@ -1,5 +1,7 @@
 //! Terms and patterns as written, before variables have values.
 
+use std::sync::Arc;
+
 use serde_json::Value;
 
 use crate::diagnostic::Span;
@@ -72,7 +74,7 @@ pub enum PatternKind {
     /// `$lt $le $gt $ge`.
     Compare(Comparison),
     /// `$matches`: a regular expression that must match the whole text.
-    Matches(regex::Regex),
+    Matches(Arc<regex::Regex>),
     /// `$present: true`, or `$absent: false`.
     Present,
     /// `$absent: true`, or `$present: false`.

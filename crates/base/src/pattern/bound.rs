@@ -1,5 +1,8 @@
 //! A pattern whose variables have been filled in.
 
+use std::collections::HashMap;
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
+
 use serde_json::Value;
 
 use super::ast::{Compare, Element, Pattern, PatternKind};
@@ -32,16 +35,31 @@ pub(super) enum BoundKind {
     In(Vec<Bound>),
     Not(Box<Bound>),
     Compare(Compare, serde_json::Number),
-    Matches(regex::Regex),
+    Matches(Arc<regex::Regex>),
     Present,
     Absent,
 }
 
+/// The expressions of all suites that were read, by the text of the pattern.
+static COMPILED: LazyLock<Mutex<HashMap<String, Arc<regex::Regex>>>> = LazyLock::new(Mutex::default);
+
 /// The regular expression of a `$matches`: it has to match the whole text.
-pub fn whole_text(pattern: &str) -> Result<regex::Regex, regex::Error> {
+///
+/// Rows of tables and states that many tests use bring few expressions many times, so each is compiled once. It is shared and not
+/// cloned, since every clone of an expression has a cache of its own, which is larger than a message.
+///
+/// # Errors
+/// What is wrong with the expression.
+pub fn whole_text(pattern: &str) -> Result<Arc<regex::Regex>, regex::Error> {
+    let mut compiled = COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(known) = compiled.get(pattern) {
+        return Ok(Arc::clone(known));
+    }
     // Compiled alone first, so that `a)(b` is not accepted by way of the group around it.
     regex::Regex::new(pattern)?;
-    regex::Regex::new(&format!(r"\A(?:{pattern})\z"))
+    let whole = Arc::new(regex::Regex::new(&format!(r"\A(?:{pattern})\z"))?);
+    compiled.insert(pattern.to_owned(), Arc::clone(&whole));
+    Ok(whole)
 }
 
 impl Pattern {
@@ -91,7 +109,7 @@ impl Pattern {
                     value,
                 },
             },
-            PatternKind::Matches(regex) => BoundKind::Matches(regex.clone()),
+            PatternKind::Matches(regex) => BoundKind::Matches(Arc::clone(regex)),
             PatternKind::Present => BoundKind::Present,
             PatternKind::Absent => BoundKind::Absent,
         };

@@ -28,7 +28,6 @@ use super::run_contexts::{Ground, RunContexts};
 use super::test::TestJudge;
 use super::timeline::Timeline;
 use tck_base::clock::{Moment, Stamp};
-use tck_base::time::TimeLimits;
 use tck_base::verdict::Verdict;
 use tck_journal::Entry;
 use tck_journal::event::{Event, Occurrence, Plan, Reading, RunHeader, Waiver};
@@ -166,12 +165,7 @@ impl RunJudge {
             Event::Waived { waiver } => self.ground.waivers.push(waiver.clone()),
             Event::Planned { plan } => self.plan = (**plan).clone(),
             // Outside a test, a variable gets its value for the whole run.
-            Event::Bound { name, value } if self.current.is_none() => {
-                let mut bindings = tck_base::pattern::Bindings::above(vec![Arc::clone(&self.ground.bindings)]);
-                bindings.set(name, value.clone());
-                self.ground.bindings = Arc::new(bindings.to_map());
-                self.ground.time = TimeLimits::of_bindings(&self.ground.bindings);
-            }
+            Event::Bound { name, value } if self.current.is_none() => self.ground.set(name, value.clone()),
             Event::TestBegun {
                 test,
                 bindings,

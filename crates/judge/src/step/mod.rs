@@ -162,7 +162,7 @@ pub(super) enum Evaluator {
 impl Evaluator {
     /// Begins a step. Entries that are already in the timeline are looked at right away.
     pub(super) fn begin(step: &Step, position: Position, scene: &EvalContext<'_>) -> Self {
-        let begun = match &step.verb {
+        let begun = match &*step.verb {
             Verb::Expect(verb) => expect::Expecting::begin(verb, step, position, scene).map(Self::Expect),
             Verb::Never(verb) => never::Forbidding::begin(verb, step, position, scene).map(Self::Never),
             Verb::Always(verb) => always::Holding::begin(verb, step, position, scene).map(Self::Always),

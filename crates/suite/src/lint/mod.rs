@@ -538,7 +538,7 @@ impl<'a> Linter<'a> {
         }
         let steps = || test.sections().into_iter().flat_map(|(_, steps)| steps);
         let sends = || {
-            steps().filter_map(|step| match &step.verb {
+            steps().filter_map(|step| match &*step.verb {
                 Verb::Send(send) => Some((step, send)),
                 _ => None,
             })
@@ -562,7 +562,7 @@ impl<'a> Linter<'a> {
         }
         // A message made by hand, or a person, can move the vehicle without a route.
         let by_hand = sends().any(|(_, send)| send.route.is_none() && send.topic == "order")
-            || steps().any(|step| matches!(step.verb, Verb::Operator(_)));
+            || steps().any(|step| matches!(*step.verb, Verb::Operator(_)));
         if test.moves && driving.is_none() && !by_hand {
             self.problems.at(
                 "moves-nowhere",

@@ -43,7 +43,7 @@ impl<'a> Scope<'a> {
         let mut later = Vec::new();
         for step in steps {
             later.extend(definitions(step).into_iter().map(|(name, _, _)| name));
-            if let Verb::Serve(serve) = &step.verb {
+            if let Verb::Serve(serve) = &*step.verb {
                 later.push(format!("serve.{}", serve.name));
             }
         }
@@ -81,19 +81,19 @@ impl<'a> Scope<'a> {
 
     /// Takes over the names a stimulus defines; they are known to the stimulus itself.
     pub(super) fn enter(&mut self, step: &Step, problems: &mut Problems) {
-        if let Verb::Serve(serve) = &step.verb
+        if let Verb::Serve(serve) = &*step.verb
             && !self.served.contains(&serve.name)
         {
             self.served.push(serve.name.clone());
         }
-        if matches!(step.verb, Verb::Send(_)) {
+        if matches!(*step.verb, Verb::Send(_)) {
             self.define(step, problems);
         }
     }
 
     /// Takes over the names a step saves; they are known to later steps.
     pub(super) fn leave(&mut self, step: &Step, problems: &mut Problems) {
-        if !matches!(step.verb, Verb::Send(_)) {
+        if !matches!(*step.verb, Verb::Send(_)) {
             self.define(step, problems);
         }
     }
@@ -338,7 +338,7 @@ fn is_course_use(rest: &str) -> bool {
 
 /// The names a step defines, what they mean, and where.
 fn definitions(step: &Step) -> Vec<(String, Origin, Span)> {
-    match &step.verb {
+    match &*step.verb {
         Verb::Send(send) => send
             .route
             .iter()

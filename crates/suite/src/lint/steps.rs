@@ -20,7 +20,7 @@ impl Linter<'_> {
             self.must_not_decide(step, section);
         }
         let at = &step.verb_span;
-        match &step.verb {
+        match &*step.verb {
             Verb::Send(send) => self.send(send, packs, at),
             Verb::Expect(expect) => {
                 let judged = expect.assert.iter().chain(&expect.prefer).map(|one| &one.span);

@@ -182,8 +182,8 @@ pub struct Step {
     pub title: Option<String>,
     /// Versions it is for.
     pub spec: Option<VersionRange>,
-    /// The verb and its arguments.
-    pub verb: Verb,
+    /// The verb and its arguments; shared by the tests that use the same state.
+    pub verb: Arc<Verb>,
     /// What the innermost state that it comes from, and that says so, is for.
     pub purpose: Option<Purpose>,
     /// Whether its requirements stand under `owes:`: a precondition that is itself an obligation of the device.
@@ -213,7 +213,7 @@ impl Step {
                     .map(|b| (b.requirement.clone(), format!("{}{suffix}", self.path))),
             );
         };
-        match &self.verb {
+        match &*self.verb {
             Verb::Expect(step) => {
                 checks(&step.checks, word);
                 let asserts = step.assert.iter().chain(&step.prefer);

@@ -34,7 +34,7 @@ impl Test {
             tags.insert("maps");
         }
         for step in self.sections().into_iter().flat_map(|(_, steps)| steps) {
-            match step.verb {
+            match *step.verb {
                 Verb::Operator(_) => drop(tags.insert("hook")),
                 Verb::Link(_) => drop(tags.insert("link")),
                 Verb::Serve(_) => drop(tags.insert("maps")),
@@ -48,7 +48,7 @@ impl Test {
     #[must_use]
     pub fn hooks(&self) -> BTreeSet<&str> {
         let steps = self.sections().into_iter().flat_map(|(_, steps)| steps);
-        let used = steps.filter_map(|step| match &step.verb {
+        let used = steps.filter_map(|step| match &*step.verb {
             Verb::Operator(operator) => Some(operator.hook.as_str()),
             _ => None,
         });

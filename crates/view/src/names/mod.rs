@@ -5,6 +5,7 @@ mod table;
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::sync::{Arc, LazyLock};
 
 use serde::{Deserialize, Deserializer};
 use serde_json::Value;
@@ -106,7 +107,7 @@ const fn same(one: &str, other: &str) -> bool {
 #[derive(Clone, Debug)]
 pub struct Names {
     /// By object.
-    tables: Vec<Table>,
+    tables: Arc<[Table]>,
     id: u64,
 }
 
@@ -147,14 +148,19 @@ pub enum NamesError {
     },
 }
 
+/// The names of 2.x.
+static USUAL: LazyLock<Names> = LazyLock::new(|| {
+    let table = |object: Object| {
+        let members = object.shape().members.iter();
+        let names = members.map(|entry| (!entry.later).then_some(entry.wire));
+        Table::new(&names.collect::<Vec<_>>(), object.shape())
+    };
+    Names::of(Object::ALL.into_iter().map(table).collect())
+});
+
 impl Default for Names {
     fn default() -> Self {
-        let table = |object: Object| {
-            let members = object.shape().members.iter();
-            let names = members.map(|entry| (!entry.later).then_some(entry.wire));
-            Table::new(&names.collect::<Vec<_>>(), object.shape())
-        };
-        Self::of(Object::ALL.into_iter().map(table).collect())
+        USUAL.clone()
     }
 }
 
@@ -162,12 +168,15 @@ impl Names {
     fn of(tables: Vec<Table>) -> Self {
         let names = Field::all().map(|field| tables[field.object as usize].name(field.index).unwrap_or_default());
         let id = print::of_bytes(names.collect::<Vec<_>>().join("\n").as_bytes());
-        Self { tables, id }
+        Self {
+            tables: tables.into(),
+            id,
+        }
     }
 
     /// The default names with these changes.
     fn changed(changes: &BTreeMap<String, BTreeMap<String, Value>>) -> Result<Self, NamesError> {
-        let mut tables = Self::default().tables;
+        let mut tables = USUAL.tables.to_vec();
         for (object, changes) in changes {
             let found = Object::of_name(object).ok_or_else(|| NamesError::NoObject(object.clone()))?;
             let shape = found.shape();
