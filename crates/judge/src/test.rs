@@ -257,7 +257,7 @@ impl TestJudge {
             && section == Section::Steps
             && self
                 .next_waiting(&step)
-                .is_some_and(|next| matches!(next.verb, Verb::Never(_)));
+                .is_some_and(|next| matches!(*next.verb, Verb::Never(_)));
         let cut_short = match end {
             StepEnd::Decided | StepEnd::Deadline => None,
             StepEnd::Declined(_) if is_answer => None,

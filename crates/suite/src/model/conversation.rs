@@ -41,7 +41,7 @@ impl Test {
             .filter(|step| place_in_body(&step.path).is_some_and(|at| own.contains(&at)));
         let does = |step: &Step| {
             let only_hears = matches!(
-                step.verb,
+                *step.verb,
                 Verb::Expect(_) | Verb::Never(_) | Verb::Always(_) | Verb::Action(_) | Verb::Retained(_)
             );
             !only_hears
