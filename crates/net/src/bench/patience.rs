@@ -178,7 +178,9 @@ mod tests {
     fn the_end_of_a_head_is_seen_however_it_comes() {
         let whole = |parts: &[&str]| {
             let mut head = Head::default();
-            parts.iter().for_each(|part| head.see(part.as_bytes()));
+            for part in parts {
+                head.see(part.as_bytes());
+            }
             head.is_whole
         };
         assert!(whole(&["GET / HTTP/1.1\r\nA: b\r", "\n", "\r\n"]) && whole(&["GET /\n\nbody"]));

@@ -153,7 +153,7 @@ async fn run(
 async fn nobody(both: &Both) {
     tokio::time::sleep(CONNECT_LIMIT).await;
     if both.has_begun() {
-        std::future::pending().await
+        std::future::pending::<()>().await;
     }
 }
 
