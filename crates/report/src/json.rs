@@ -118,11 +118,15 @@ pub fn write(path: &Path, result: &RunResult) -> Result<(), ResultError> {
 }
 
 /// Writes a file so that a reader sees the old content or the new, and never half of either: to a
-/// neighbour first, which is then renamed.
+/// neighbour first, which is then renamed. What is there and no file, such as a terminal, a pipe or `/dev/null`, is written to as
+/// it is, because it cannot be replaced.
 ///
 /// # Errors
 /// What the operating system says; the neighbour is removed again.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    if std::fs::metadata(path).is_ok_and(|facts| !facts.is_file() && !facts.is_dir()) {
+        return std::fs::write(path, bytes);
+    }
     let mut name = path
         .file_name()
         .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "not a file name"))?

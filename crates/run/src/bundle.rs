@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::latest::Latest;
 use tck_journal::file::{self, JournalWriter};
+use tck_report::json::write_atomically;
 
 /// Why a bundle cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -132,23 +133,10 @@ pub fn write_whole(path: &Path, content: &[u8]) -> Result<(), BundleError> {
         path: path.to_owned(),
         reason,
     };
-    let Some(name) = path.file_name() else {
-        return Err(failed(std::io::Error::other("this is no name of a file")));
-    };
-    let folder = path.parent().unwrap_or(Path::new(""));
-    if !folder.as_os_str().is_empty() {
+    if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         std::fs::create_dir_all(folder).map_err(failed)?;
     }
-    // What is no file, such as a terminal or a pipe, cannot be replaced.
-    if std::fs::metadata(path).is_ok_and(|facts| !facts.is_file() && !facts.is_dir()) {
-        return std::fs::write(path, content).map_err(failed);
-    }
-    let draft = folder.join(format!(".{}.draft", name.display()));
-    let written = std::fs::write(&draft, content).and_then(|()| std::fs::rename(&draft, path));
-    written.map_err(|reason| {
-        let _ = std::fs::remove_file(&draft);
-        failed(reason)
-    })
+    write_atomically(path, content).map_err(failed)
 }
 
 /// Makes a folder that was not there.

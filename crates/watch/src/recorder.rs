@@ -33,9 +33,13 @@ pub(super) struct Recorder {
 }
 
 impl Recorder {
-    /// Begins. A file that is there keeps what it holds, under another name.
+    /// Begins. A file that is there keeps what it holds, under another name; what is no file is refused, since its parts could not
+    /// be closed under names of their own.
     pub fn create(path: &Path, rotation: Rotation, header: RunHeader, at: Stamp) -> io::Result<Self> {
         if let Ok(found) = path.metadata() {
+            if !found.is_file() {
+                return Err(io::Error::new(io::ErrorKind::InvalidInput, "this is no file"));
+            }
             let modified = found.modified().ok().and_then(|time| time.try_into().ok());
             std::fs::rename(path, aside(path, modified.unwrap_or(at.utc)))?;
         }
