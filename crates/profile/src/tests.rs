@@ -177,11 +177,14 @@ fn the_schema_for_editors_refuses_what_a_schema_can_refuse() {
         "slow-after-react",
         "statements-contradict",
     ];
-    const ALSO_BEYOND: [&str; 8] = [
+    const ALSO_BEYOND: [&str; 11] = [
         "action-claimed",
         "action-claimed-absent",
+        "claim-about-an-unknown-hook",
+        "claim-without-a-needed-hook",
         "hook-header",
         "hook-listen-and-timeout",
+        "hook-prompt-of-nothing",
         "hook-unknown",
         "no-tap-no-broker",
         "topic-template-placeholder",

@@ -36,8 +36,9 @@ pub(super) fn remedy(reason: &Reason) -> Option<String> {
         Reason::OverBudget { .. } => {
             "give the run more time (--budget), or go on with what is left (--resume)".to_owned()
         }
-        Reason::NobodyToAsk { .. }
-        | Reason::NothingForHook { .. }
+        Reason::NobodyToAsk { .. } => "answer at a terminal, or over HTTP (--questions)".to_owned(),
+        Reason::RunEnded => "go on with what is left (--resume)".to_owned(),
+        Reason::NothingForHook { .. }
         | Reason::SampleDenied { .. }
         | Reason::StatedFalse { .. }
         | Reason::NoActiveMap
@@ -57,7 +58,6 @@ pub(super) fn remedy(reason: &Reason) -> Option<String> {
         | Reason::SetAside { .. }
         | Reason::PreconditionMissed { .. }
         | Reason::PreconditionRefused { .. }
-        | Reason::RunEnded
         | Reason::Observed { .. } => return None,
     })
 }

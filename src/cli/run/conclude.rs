@@ -155,7 +155,7 @@ fn why_not(end: &End, result: &RunResult, exit: Exit, shown: &str) -> Option<Pro
         }
         End::Completed | End::Interrupted => None,
         End::Stranger(why) => {
-            let hint = "set manufacturer, serial-number, protocol-version or topic-template in the section [device] of the \
+            let hint = "set manufacturer, serial-number, protocol or topic-template in the section [device] of the \
                         profile";
             Some(Diagnostic::whole("another-device", why.as_str()).hint(hint).into())
         }

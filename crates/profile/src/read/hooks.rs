@@ -102,6 +102,13 @@ impl Reader<'_> {
             "listen" => HookAction::NaturalTraffic,
             _ => self.http(&what, value)?,
         };
+        if let HookAction::Prompt(text) = &action
+            && !text.contains(char::is_alphanumeric)
+        {
+            let hint = Some("write what the person is to do, in a sentence".to_owned());
+            self.complain("bad-value", value.span(), &format!("{what} says nothing"), text, hint);
+            return None;
+        }
         let hooks = self.hooks;
         let parameters = hooks.named(hook).flat_map(|info| &info.parameters);
         let mut known: Vec<&str> = parameters
