@@ -397,7 +397,7 @@ impl TestJudge {
             .skip_while(|other| other.path != step.path)
             .skip(1);
         let mut waiting = behind.filter(|step| {
-            let verb = &step.verb;
+            let verb = &*step.verb;
             matches!(
                 verb,
                 Verb::Never(_) | Verb::Expect(_) | Verb::Always(_) | Verb::Action(_) | Verb::Retained(_)
