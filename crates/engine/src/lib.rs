@@ -228,7 +228,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
                 watcher.waiting(step);
                 match self.step(step, section, watcher).await {
                     Ok(StepEnd::Refused(_) | StepEnd::Declined(_)) => {
-                        goes_on_at = test.goes_on_at(&step.path).unwrap_or(0)
+                        goes_on_at = test.goes_on_at(&step.path).unwrap_or(0);
                     }
                     Ok(_) => {}
                     Err(error) => {
