@@ -2,6 +2,9 @@
 //! decided, and none fails; what cannot be decided stands in a table with the reason.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
+#[path = "imperfect/share.rs"]
+mod share;
+
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -283,10 +286,13 @@ const REFUSALS: [&str; 8] = [
 ];
 
 #[test]
-#[ignore = "takes a minute; CI runs it"]
+#[ignore = "takes minutes; CI runs a share of it each day"]
 fn with_each_tolerance_everything_is_decided_and_nothing_fails() {
-    let sets: Vec<Vec<&str>> = all().map(|name| vec![name]).collect();
-    insta::assert_snapshot!(warnings(&sets, Wanted::Everything));
+    let sets: Vec<Vec<&str>> = share::of(all()).map(|name| vec![name]).collect();
+    let warned = warnings(&sets, Wanted::Everything);
+    let is_tried = |line: &&str| sets.iter().any(|set| line.split(':').next() == set.first().copied());
+    let known: Vec<&str> = include_str!("imperfect/agv-warned.txt").lines().filter(is_tried).collect();
+    assert_eq!(warned.lines().collect::<Vec<_>>(), known);
 }
 
 #[test]
