@@ -116,7 +116,16 @@ fn first_of(tests: &[impl AsRef<str>]) -> String {
 
 /// Refuses a run that would leave tests undecided for what the profile does not say or the bench does not have.
 pub(super) fn complete(plan: &RunPlan) -> Result<(), Problem> {
-    let lacking = plan.reasons(Waits::Inconclusive);
+    let mut lacking: Vec<(String, Vec<&str>)> = plan
+        .reasons(Waits::Inconclusive)
+        .into_iter()
+        .map(|(why, tests)| (advice(why), tests))
+        .collect();
+    let wanting = plan.floor.iter().flat_map(|floor| &floor.wanting);
+    lacking.extend(wanting.filter(|one| one.from == 0).map(|one| {
+        let tests = one.tests.iter().map(String::as_str).collect();
+        (format!("the floor allows them from no place: {}", one.why), tests)
+    }));
     if lacking.is_empty() {
         return Ok(());
     }
@@ -130,11 +139,12 @@ pub(super) fn complete(plan: &RunPlan) -> Result<(), Problem> {
             title,
             "\n{:>11}  {}\n             {}",
             many(tests.len(), "test"),
-            escaped(&advice(why)),
+            escaped(&why),
             first_of(&tests)
         );
     }
-    let hint = "say of what the device does not have that it has not (`claims`, in the section [device]), or use `run`";
+    let hint = "say of what the device does not have that it has not (`claims`, in the section [device]), name more floor in the section \
+                [layout], or use `run`";
     Err(Diagnostic::whole("certify", title).hint(hint).into())
 }
 

@@ -89,7 +89,7 @@ fn a_program_that_cannot_be_started_is_named() {
     std::fs::write(bench.path().join("device.toml"), profile.text()).unwrap();
     bench
         .run(&["run", "--profile", "device.toml", QUICK])
-        .code(5)
+        .code(2)
         .says_one_error("cannot start the device with `./no-such-vehicle`");
 }
 

@@ -95,9 +95,12 @@ impl Continuity {
             return self.early.take().map_or(Step::Begins, |early| Step::Hole(early.since));
         }
         let before = self.last.insert(name.to_owned(), (id, now));
+        let starts_are_seen = self.last.contains_key("connection");
         let counted = match before {
             None => Step::Begins,
             Some((Some(before), _)) if id == Some(next(before)) => Step::Follows,
+            // A count that stands still hides nothing, unless its first number may be that of another start.
+            Some((Some(before), _)) if id == Some(before) && (before > 1 || starts_are_seen) => Step::Follows,
             Some((_, since)) => Step::Hole(since),
         };
         let step = match (counted, message) {

@@ -8,6 +8,7 @@ use std::hash::BuildHasher as _;
 use std::time::Duration;
 
 use tck_base::clock::Moment;
+use tck_view::Print;
 
 /// How many messages of a vehicle are remembered to know them again.
 const REMEMBERED: usize = 512;
@@ -24,9 +25,13 @@ pub(super) struct Known {
 }
 
 impl Known {
-    /// Whether the same bytes came on the same topic before.
-    pub fn again(&mut self, topic: &str, payload: &[u8]) -> bool {
-        let print = self.hash.hash_one((topic, payload));
+    /// Whether the same came on the same topic before: the same values, however a recorder writes them (`%J` of `mosquitto_sub`
+    /// writes numbers anew), or the same bytes of what is no message.
+    pub fn again(&mut self, topic: &str, payload: &[u8], values: Option<Print>) -> bool {
+        let print = match values {
+            Some(values) => self.hash.hash_one((topic, values)),
+            None => self.hash.hash_one((topic, payload)),
+        };
         if self.prints.contains(&print) {
             return true;
         }
@@ -155,13 +160,13 @@ mod tests {
     #[test]
     fn the_same_bytes_are_known_again() {
         let mut known = Known::default();
-        assert!(!known.again("a", b"{}"));
-        assert!(!known.again("b", b"{}"));
-        assert!(known.again("a", b"{}"));
+        assert!(!known.again("a", b"{}", None));
+        assert!(!known.again("b", b"{}", None));
+        assert!(known.again("a", b"{}", None));
         for number in 0..REMEMBERED {
-            known.again("a", &number.to_le_bytes());
+            known.again("a", &number.to_le_bytes(), None);
         }
-        assert!(!known.again("a", b"{}"));
+        assert!(!known.again("a", b"{}", None));
     }
 
     proptest! {

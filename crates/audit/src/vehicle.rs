@@ -118,11 +118,6 @@ impl Vehicle {
         let topic = scene.rules.packs.latest().topic(name);
         let is_stored = || topic.is_none_or(|rule| rule.retain) || !is_fresh(&message);
         let stale = message.retain.unwrap_or_else(|| is_first && is_stored());
-        if !stale && self.known.again(name, &message.payload) {
-            self.twice += 1;
-            return true;
-        }
-        self.stale += u64::from(stale);
         let payload = Payload::keep(message.payload);
         let mut arrived = Arrived {
             number,
@@ -150,6 +145,13 @@ impl Vehicle {
             }),
         };
         let said = arrived.message(self.names(scene));
+        let values = said.map(MessageView::print);
+        let bytes = arrived.entry.payload().map(Payload::bytes).unwrap_or_default();
+        if !stale && self.known.again(name, bytes, values) {
+            self.twice += 1;
+            return true;
+        }
+        self.stale += u64::from(stale);
         let id = said.and_then(|said| said.header().header_id.whole());
         let stamped = (!self.timed).then(|| said.and_then(timestamp)).flatten();
         let at = self.stamp(message.at, stamped);

@@ -18,7 +18,8 @@ pub(super) const ID_RISES: Check = Check {
     doc: "headerId is a whole number from 0 to 4294967295 that rises by one with each message of a topic. Any start \
           value and a restart of the count after a new connection are accepted, but one after a link that only the \
           harness has broken is a warning, and so is one count for the topics of all vehicles; the last will is exempt. At the tap \
-          the PUBLISH packets count; a subscriber cannot tell a gap from a lost message, which is inconclusive.",
+          the PUBLISH packets count; a subscriber cannot tell a gap from a lost message, nor the first number again from a restart \
+          that it did not see, which is inconclusive.",
     arguments: &[],
     listens: &[
         Listen::Connect,
@@ -40,6 +41,10 @@ struct IdRises {
     last: BTreeMap<String, u32>,
     /// The last ids before a link that only the harness has broken.
     before_cut: BTreeMap<String, u32>,
+    /// How often in a row the last id of a topic came again.
+    repeated: BTreeMap<String, u32>,
+    /// Messages on `connection` are seen, so that a restart is.
+    hears_connection: bool,
 }
 
 impl Running for IdRises {
@@ -88,6 +93,7 @@ impl Running for IdRises {
                 return false;
             }
             self.last.clear();
+            self.hears_connection = true;
         }
         let Some(id) = Self::read(&said.header().header_id, message.name, record, findings) else {
             self.last.remove(message.name);
@@ -101,9 +107,16 @@ impl Running for IdRises {
             findings.push(remark("HDR-02", record.seq(), text));
         }
         let before = self.last.insert(message.name.to_owned(), id);
-        let Some(before) = before else { return true };
+        let Some(before) = before else {
+            self.repeated.remove(message.name);
+            return true;
+        };
         let expected = before.wrapping_add(1);
         let again = id == before;
+        let repeated = self.repeated.entry(message.name.to_owned()).or_default();
+        *repeated = if again { *repeated + 1 } else { 0 };
+        // A count that begins anew with each start may show its first number twice, but nobody starts three times unseen.
+        let stands_still = again && (id > 1 || (*repeated > 1 && self.hears_connection));
         if id == expected || (again && message.dup) {
             return true;
         }
@@ -111,7 +124,7 @@ impl Running for IdRises {
         if shared.is_some_and(|last| last != before && id == last.wrapping_add(1)) {
             let text = format!("{text}: the topics of all vehicles are counted together");
             findings.push(remark("HDR-02", record.seq(), text));
-        } else if record.link.tap || (again && id > 1) {
+        } else if record.link.tap || stands_still {
             findings.push(broken("HDR-02", record.seq(), text));
         } else if again || id < before {
             findings.push(unclear(
@@ -250,6 +263,22 @@ mod tests {
         trace.fault(LinkFault::Restore);
         trace.publish(1, "state", 0, false, &json!({ "headerId": 11 }));
         assert!(trace.judge(CHECK).findings.is_empty());
+    }
+
+    #[test]
+    fn a_count_that_stands_still_is_found_by_a_subscriber() {
+        let judged = |ids: [u32; 3]| {
+            let mut trace = Trace::subscriber();
+            trace.connection("ONLINE");
+            for id in ids {
+                trace.message("state", &json!({ "headerId": id }));
+            }
+            trace.judge(CHECK).summary()
+        };
+        // Twice may be a restart that was not seen, three times is none.
+        assert_eq!(judged([0, 0, 1]), ["HDR-02 inconclusive"]);
+        assert_eq!(judged([0, 0, 0]), ["HDR-02 inconclusive", "HDR-02"]);
+        assert_eq!(judged([7, 7, 8]), ["HDR-02"]);
     }
 
     #[test]

@@ -185,7 +185,7 @@ impl DeviceProcess {
         output.read_line(&mut line).await?;
         match Told::of(line.trim_end()) {
             Some(Told::Started) => Ok((Leash::Supervisor(input), Ear::Supervisor(output, child), process)),
-            Some(Told::Failed(why)) => Err(std::io::Error::other(why)),
+            Some(Told::Failed(why)) => Err(std::io::Error::new(std::io::ErrorKind::NotFound, why)),
             _ => Err(std::io::Error::other("the process that starts the device has ended")),
         }
     }
@@ -196,10 +196,10 @@ impl DeviceProcess {
         };
         let mut command = self.command(program.as_ref())?;
         command.args(arguments).stdin(Stdio::null()).stdout(self.output()?);
-        let child = command
-            .kill_on_drop(true)
-            .spawn()
-            .map_err(|error| std::io::Error::other(format!("cannot start the device with `{program}`: {error}")))?;
+        let child = command.kill_on_drop(true).spawn().map_err(|error| {
+            let why = format!("cannot start the device with `{program}`: {error}");
+            std::io::Error::new(std::io::ErrorKind::NotFound, why)
+        })?;
         let process = child.id().unwrap_or_default();
         self.is_kin(process);
         Ok((Leash::Group(Group::of(&child)), Ear::Program(child), process))

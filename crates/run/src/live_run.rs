@@ -105,7 +105,7 @@ pub enum RunError {
     /// The run cannot be carried out.
     #[error(transparent)]
     Engine(#[from] EngineError),
-    /// The device cannot be started, or no port is free for it.
+    /// The device cannot be started (`NotFound` where its program is what cannot be started), or no port is free for it.
     #[error(transparent)]
     Device(#[from] std::io::Error),
 }

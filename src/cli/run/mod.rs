@@ -439,8 +439,14 @@ impl Job {
             (RunError::Unknown(unknown), _) => Diagnostic::whole("fault", unknown.to_string()).into(),
             (error, Some(setting)) => {
                 let text = crate::ui::escaped(&error.to_string());
-                let complaint = self.effective.complain(setting, "bench", text, "this one");
-                Problem::Bench(Box::new(without_secrets(complaint)))
+                let complaint = without_secrets(self.effective.complain(setting, "bench", text, "this one"));
+                match error {
+                    // To try again starts no program that is not there.
+                    RunError::Device(why) if why.kind() == std::io::ErrorKind::NotFound => {
+                        Problem::Usage(vec![complaint])
+                    }
+                    _ => Problem::Bench(Box::new(complaint)),
+                }
             }
             (error, None) => environment(error),
         }
