@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use crate::finding::{broken, remark, show, unclear};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::event::{Event, Packet};
+use tck_journal::event::{Event, Packet, Program};
 use tck_pack::{HookEffect, HookInfo, Role};
 use tck_view::{Header, Member, Number};
 use tck_world::{Listen, Observation, Topic};
@@ -27,6 +27,7 @@ pub(super) const ID_RISES: Check = Check {
         Listen::Hook,
         Listen::Answer,
         Listen::Undecodable,
+        Listen::Program,
         Listen::AnyDelivered,
         Listen::AnyPublished,
     ],
@@ -62,6 +63,13 @@ impl Running for IdRises {
             } => self.last.clear(),
             // The process goes on when the harness breaks its link, and so may its count.
             Event::Fault { .. } => self.before_cut.append(&mut self.last),
+            // Another process counts anew, whatever became of the link before.
+            Event::Program {
+                program: Program::Ended { .. },
+            } => {
+                self.last.clear();
+                self.before_cut.clear();
+            }
             // What makes a master control act does not restart it.
             Event::Hook { hook, .. }
                 if context.role == Role::MasterControl && !context.hook(hook).is_some_and(HookInfo::may_restart) => {}
@@ -263,6 +271,28 @@ mod tests {
         trace.fault(LinkFault::Restore);
         trace.publish(1, "state", 0, false, &json!({ "headerId": 11 }));
         assert!(trace.judge(CHECK).findings.is_empty());
+    }
+
+    #[test]
+    fn a_count_that_begins_anew_behind_a_cut_is_remarked_unless_the_program_was_started_anew() {
+        let judged = |ends: bool| {
+            let mut trace = Trace::tap();
+            trace
+                .connected(1)
+                .publish(1, "state", 0, false, &json!({ "headerId": 5 }));
+            trace.fault(LinkFault::Silence { direction: None });
+            trace.fault(LinkFault::Restore);
+            if ends {
+                trace.program_ends();
+            }
+            trace
+                .closed(1)
+                .connected(2)
+                .publish(2, "state", 0, false, &json!({ "headerId": 0 }));
+            trace.judge(CHECK).summary()
+        };
+        assert_eq!(judged(false), ["HDR-02 warning"]);
+        assert!(judged(true).is_empty());
     }
 
     #[test]

@@ -322,6 +322,15 @@ impl Trace {
         self.add(Source::Harness, None, Event::Lag { micros, of })
     }
 
+    /// The program that the run has started ends.
+    pub fn program_ends(&mut self) -> &mut Self {
+        let program = Program::Ended {
+            how: Ending::Signal(9),
+            words: String::new(),
+        };
+        self.add(Source::Harness, None, Event::Program { program })
+    }
+
     pub fn hook(&mut self) -> &mut Self {
         let event = Event::Hook {
             hook: "power-cycle".into(),

@@ -75,6 +75,8 @@ pub enum Listen {
     Step,
     /// The run begins.
     Begin,
+    /// What becomes of the program that the run has started.
+    Program,
 }
 
 /// The kind of one observation.
@@ -102,8 +104,9 @@ impl Kind {
     pub(crate) const VEHICLE: Self = Self(OTHERS + 12);
     pub(crate) const STEP: Self = Self(OTHERS + 13);
     pub(crate) const BEGIN: Self = Self(OTHERS + 14);
+    pub(crate) const PROGRAM: Self = Self(OTHERS + 15);
     /// Nobody listens to it alone.
-    pub(crate) const REST: Self = Self(OTHERS + 15);
+    pub(crate) const REST: Self = Self(OTHERS + 16);
 
     /// Of a message on a topic of the vehicle.
     pub(crate) const fn message(way: Seen, topic: Topic) -> Self {
@@ -167,6 +170,7 @@ impl Listens {
             Listen::Vehicle => Kind::VEHICLE.bit(),
             Listen::Step => Kind::STEP.bit(),
             Listen::Begin => Kind::BEGIN.bit(),
+            Listen::Program => Kind::PROGRAM.bit(),
         }
     }
 }

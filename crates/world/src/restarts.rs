@@ -1,6 +1,6 @@
 //! Whether a vehicle that connects again may have forgotten everything, or was only cut off by the harness.
 
-use tck_journal::event::{Event, LinkFault};
+use tck_journal::event::{Event, LinkFault, Program};
 use tck_view::Topic;
 
 use crate::listen::Seen;
@@ -48,6 +48,14 @@ impl Restarts {
     pub(crate) fn learn(&mut self, record: &Observation<'_>) {
         if let Event::Fault { fault } = record.event() {
             self.cut |= *fault != LinkFault::Restore;
+        }
+        // What comes behind the end of its program has been started anew, whatever became of the link before.
+        if let Event::Program {
+            program: Program::Ended { .. },
+        } = record.event()
+        {
+            self.cut = false;
+            self.pending = false;
         }
         let connects = self.is_back(record);
         if connects {

@@ -125,6 +125,7 @@ impl Observer {
             Event::Vehicle { .. } => Kind::VEHICLE,
             Event::Mark { .. } | Event::Bound { .. } => Kind::STEP,
             Event::RunBegun { .. } => Kind::BEGIN,
+            Event::Program { .. } => Kind::PROGRAM,
             _ => Kind::REST,
         };
         (None, None, kind)
