@@ -61,15 +61,32 @@ const MASTER_CONTROL: Device = Device {
 const PYTHON_AGV: Device = Device {
     folder: "fixtures/devices/vda5050-sdk-agv",
     package: Package::PyPi,
-    variants: &[variant("as-shipped", "device.toml", 6)],
-    left_out: &["blocking", "combinations", "order-rejection/schema"],
+    variants: &[variant("as-shipped", "device.toml", 8)],
+    left_out: &["blocking", "combinations", "order-rejection/schema-*"],
 };
 
 const PYTHON_MASTER_CONTROL: Device = Device {
     folder: "fixtures/devices/vda5050-sdk-master",
     package: Package::PyPi,
-    variants: &[variant("as-shipped", "device.toml", 4)],
-    left_out: &["combinations", "connection/cut", "connection/after", "traffic", "fleet"],
+    variants: &[variant("as-shipped", "device.toml", 6)],
+    left_out: &[
+        "combinations",
+        "traffic",
+        "fleet",
+        "reported",
+        "corridors",
+        "trajectories",
+        "actions",
+        "modes/no-actions*",
+        // It never connects again, and to start it anew after a cut is taken for a mere return of the link (HDR-02).
+        "connection/*cut*",
+        "*/*after-cut",
+        "connection/lost",
+        "connection/old-will",
+        "connection/back-with-its-order",
+        "connection/state-without-connection",
+        "connection/subscribes",
+    ],
 };
 
 const ALL: [Device; 4] = [AGV, MASTER_CONTROL, PYTHON_AGV, PYTHON_MASTER_CONTROL];
