@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use serde_json::Value;
 
-use super::{AGV, MASTER_CONTROL};
+use super::ALL;
 
 /// How findings are looked for.
 #[derive(Clone, Copy, PartialEq)]
@@ -147,10 +147,9 @@ pub fn differences(expected: &[toml::Table], found: &Found) -> String {
 
 #[test]
 fn every_expected_finding_is_listed_once_and_says_why() {
-    let both = [AGV, MASTER_CONTROL];
-    let variants = both
+    let variants = ALL
         .iter()
-        .flat_map(|device| device.variants.map(|(variant, ..)| (device.folder, variant)));
+        .flat_map(|device| device.variants.iter().map(|variant| (device.folder, variant.name)));
     for (folder, variant) in variants {
         let mut seen = Verdicts::new();
         for finding in expected(folder, variant, Way::Explored) {

@@ -1,6 +1,6 @@
 //! The suites on foreign devices, and the audit of each journal, which must find what the monitors of its run found.
 //!
-//! Both variants of both devices are run at once, each on several benches (`--shard`), because most of the time is waiting.
+//! All variants of all devices are run at once, each on several benches (`--shard`), because most of the time is waiting.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -10,7 +10,7 @@ use std::process::{Child, Command, Stdio};
 use serde_json::Value;
 
 use super::listed::{Found, Way, differences, expected, list};
-use super::{AGV, Device, MASTER_CONTROL};
+use super::{ALL, Device, Variant};
 
 /// One bench: a harness that starts its own broker and its own device.
 struct Bench {
@@ -20,19 +20,21 @@ struct Bench {
 }
 
 impl Bench {
-    fn start(folder: &str, variant: &str, profile: &str, shard: usize, of: usize) -> Self {
-        let name = format!("{variant}, bench {shard} of {of}");
-        let device = Path::new(folder).file_name().unwrap().to_string_lossy();
-        let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{device}-{variant}-{shard}"));
+    fn start(device: &Device, variant: &Variant, shard: usize) -> Self {
+        let (folder, of) = (device.folder, variant.benches);
+        let name = format!("{folder}, {}, bench {shard} of {of}", variant.name);
+        let short = Path::new(folder).file_name().unwrap().to_string_lossy();
+        let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{short}-{}-{shard}", variant.name));
         let _ = std::fs::remove_dir_all(&out);
         let process = Command::new(env!("CARGO_BIN_EXE_vda5050-tck"))
             .args([
                 "run",
                 "--profile",
-                &format!("{folder}/{profile}"),
+                &format!("{folder}/{}", variant.profile),
                 "--shard",
                 &format!("{shard}/{of}"),
             ])
+            .args(device.left_out.iter().flat_map(|tests| ["--exclude", tests]))
             .arg("--out")
             .arg(&out)
             .stdin(Stdio::null())
@@ -135,20 +137,27 @@ fn find(folder: &Path, name: &str) -> Option<PathBuf> {
     None
 }
 
-/// The benches of both variants of a device, where it is installed.
-fn start(device: &Device) -> Option<[(&'static str, Vec<Bench>); 2]> {
-    let folder = device.folder;
+/// The benches of all variants of a device, where it is installed.
+fn start(device: &Device) -> Option<Vec<(&'static str, Vec<Bench>)>> {
     if !device.is_installed() {
         return None;
     }
-    Some(device.variants.map(|(variant, profile, of)| {
-        let benches = (1..=of).map(|shard| Bench::start(folder, variant, profile, shard, of));
-        (variant, benches.collect())
-    }))
+    let benches = |variant: &Variant| -> Vec<Bench> {
+        (1..=variant.benches)
+            .map(|shard| Bench::start(device, variant, shard))
+            .collect()
+    };
+    Some(
+        device
+            .variants
+            .iter()
+            .map(|variant| (variant.name, benches(variant)))
+            .collect(),
+    )
 }
 
 /// What differs from the list of a device; empty when nothing does.
-fn read(device: &Device, variants: [(&str, Vec<Bench>); 2]) -> String {
+fn read(device: &Device, variants: Vec<(&str, Vec<Bench>)>) -> String {
     let folder = device.folder;
     let mut report = String::new();
     for (variant, benches) in variants {
@@ -176,7 +185,7 @@ fn read(device: &Device, variants: [(&str, Vec<Bench>); 2]) -> String {
 
 #[test]
 fn the_harness_finds_in_foreign_devices_what_is_listed_and_nothing_else() {
-    let started = [AGV, MASTER_CONTROL].map(|device| (start(&device), device));
+    let started = ALL.map(|device| (start(&device), device));
     let reports = started.map(|(benches, device)| benches.map(|benches| read(&device, benches)));
     let report: String = reports.into_iter().flatten().collect();
     assert!(report.is_empty(), "{report}");
