@@ -11,7 +11,9 @@ use tck_base::clock::{Moment, Stamp};
 use tck_base::time::TimeLimits;
 use tck_base::verdict::Verdict;
 use tck_check::{Check, CheckContext, CheckFinding, Shared, find};
-use tck_journal::event::{Close, Direction, Event, LinkFault, Occurrence, Packet, RunHeader, Source, Will};
+use tck_journal::event::{
+    Close, Direction, Ending, Event, LinkFault, Occurrence, Packet, Program, RunHeader, Source, Will,
+};
 use tck_journal::{Entry, Journal, Payload};
 use tck_pack::{Assets, Hooks, Pack, Packs, Role};
 use tck_world::{Listen, Listens, Observer, Setting, World};
