@@ -291,7 +291,10 @@ fn with_each_tolerance_everything_is_decided_and_nothing_fails() {
     let sets: Vec<Vec<&str>> = share::of(all()).map(|name| vec![name]).collect();
     let warned = warnings(&sets, Wanted::Everything);
     let is_tried = |line: &&str| sets.iter().any(|set| line.split(':').next() == set.first().copied());
-    let known: Vec<&str> = include_str!("imperfect/agv-warned.txt").lines().filter(is_tried).collect();
+    let known: Vec<&str> = include_str!("imperfect/agv-warned.txt")
+        .lines()
+        .filter(is_tried)
+        .collect();
     assert_eq!(warned.lines().collect::<Vec<_>>(), known);
 }
 

@@ -310,7 +310,14 @@ mod tests {
         let hole = |at| Step::Hole(Moment::from_micros(at));
         assert_eq!(
             found,
-            [Step::Begins, Step::Follows, hole(1), Step::Follows, Step::Follows, hole(4)]
+            [
+                Step::Begins,
+                Step::Follows,
+                hole(1),
+                Step::Follows,
+                Step::Follows,
+                hole(4)
+            ]
         );
         let wraps = [u64::from(u32::MAX), 0].map(|id| ("state", json!({ "headerId": id })));
         assert_eq!(steps(&wraps)[1], Step::Follows);

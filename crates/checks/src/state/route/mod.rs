@@ -32,10 +32,10 @@ pub(crate) const LAST_NODE: Check = Check {
     name: "state/last-node",
     decides: &["STATE-MSG-04", "ORD-01", "ORD-07"],
     doc: "lastNodeId and lastNodeSequenceId move along the order in its sequence, and never onto a node that was not \
-          released.",
+          released. Not judged while the state shows a malformed order of the harness: that it was taken is the mistake.",
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
-    reads: &[Fact::Shown, Fact::Orders],
+    reads: &[Fact::Shown, Fact::Orders, Fact::Malformed],
     needs: &[StateView::last_node_id, StateView::last_node_sequence_id],
     start: |_| Box::new(LastNode::default()),
 };
@@ -341,6 +341,9 @@ impl Running for LastNode {
         }
         let sent: Vec<&SentOrder> = context.world.orders().of(&order).collect();
         if sent.is_empty() || sent.iter().any(|sent| !sent.sound || sent.places) {
+            return false;
+        }
+        if context.world.malformed().is_shown(record) {
             return false;
         }
         let nodes = || sent.iter().flat_map(|sent| &sent.nodes);
