@@ -13,6 +13,7 @@ use super::sheet::Sheet;
 use tck_base::pattern::{Term, TermKind};
 use tck_journal::event::{Capability, Gate};
 use tck_journal::{Reason, Vantage};
+use tck_pack::Role;
 use tck_profile::{SAMPLE_ACTIONS, SampleKind};
 use tck_suite::model::{Need, SendAction, ServeBehaviour, Test, Verb};
 
@@ -42,6 +43,8 @@ pub struct Capabilities {
     pub map_file: Result<(), Reason>,
     /// Whether the vehicle may drive; `Err` says why not.
     pub motion: Result<(), Reason>,
+    /// Whether a master control has a second mock vehicle beside the first.
+    pub second_vehicle: bool,
     /// Whether a claim may add to a factsheet that says otherwise. Not for a certificate.
     pub claims_add: bool,
 }
@@ -98,6 +101,9 @@ impl Capabilities {
             && let Err(why) = &self.motion
         {
             open.push(why.clone());
+        }
+        if test.device == Role::MasterControl && !self.second_vehicle && test.needs_second_vehicle() {
+            open.push(Reason::OneVehicle);
         }
         if serves_a_map_to_read(test)
             && let Err(why) = &self.map_file
@@ -336,6 +342,7 @@ mod tests {
             maps: Ok(()),
             map_file: Ok(()),
             motion: Ok(()),
+            second_vehicle: true,
             claims_add: true,
         }
     }
