@@ -145,6 +145,38 @@ fn a_test_that_is_tried_once_more_has_ids_of_its_own() {
     assert!(again > 0, "no test was tried once more");
 }
 
+/// A vehicle that a message strikes dumb is started again before the next test, and no later test is blamed for it.
+#[test]
+fn a_vehicle_that_falls_silent_is_blamed_where_it_did() {
+    let library = vda5050_tck::library(None).unwrap_or_else(|all| panic!("{all:?}"));
+    let pack = library.rules.packs.get("2.1.0").unwrap();
+    let mut request = VirtualRun {
+        faults: vec!["dumb-after-malformed".to_owned()],
+        ..VirtualRun::of(&library, pack)
+    };
+    let strikes =
+        |id: &str| id.starts_with("order-rejection/schema-at-rest") || id.starts_with("order-rejection/unreadable");
+    request
+        .tests
+        .retain(|test| strikes(&test.id) || test.id.starts_with("order-update/"));
+    let finished = run_silently(&library, pack, request).unwrap();
+    let (mut struck, mut behind) = (false, 0);
+    for test in finished.result.tests.iter().filter(|test| test.verdict.is_some()) {
+        if strikes(&test.id) {
+            struck = true;
+            continue;
+        }
+        assert_eq!(test.verdict, Some(Verdict::Pass), "{}: {:?}", test.id, test.reason);
+        behind += usize::from(struck);
+    }
+    assert!(behind > 5, "only {behind} tests came behind it");
+    let limits = &finished.result.limits;
+    assert!(
+        limits.iter().any(|limit| limit.contains("has said nothing since")),
+        "{limits:?}"
+    );
+}
+
 #[test]
 fn what_was_read_over_stands_at_the_test() {
     let library = vda5050_tck::library(None).unwrap_or_else(|all| panic!("{all:?}"));

@@ -362,6 +362,27 @@ mod tests {
     }
 
     #[test]
+    fn a_test_with_two_vehicles_needs_a_second_one() {
+        let library = tck_testing::library();
+        let tests = library.tests(Role::MasterControl, &library.rules.packs.latest().id);
+        let two: Vec<_> = tests.iter().filter(|test| test.needs_second_vehicle()).collect();
+        assert!(
+            two.len() > 10 && two.len() < tests.len() / 2,
+            "{} of {}",
+            two.len(),
+            tests.len()
+        );
+        let waits = |test: &Test, second: bool| {
+            let mut device = capabilities(None);
+            device.second_vehicle = second;
+            device.weigh(test).is_ok_and(|open| open.contains(&Reason::OneVehicle))
+        };
+        for test in two {
+            assert!(waits(test, false) && !waits(test, true), "{}", test.id);
+        }
+    }
+
+    #[test]
     fn the_factsheet_decides_what_applies() {
         let known = capabilities(Some(sheet()));
         assert_eq!(known.has(&action(Some("NODE"))), Gate::Runs);

@@ -352,9 +352,13 @@ mod tests {
     use tck_judge::TrafficJudge;
 
     fn profile(others: &str) -> Effective {
+        commanding("[\"a-1\", \"a-2\"]", others)
+    }
+
+    fn commanding(serials: &str, others: &str) -> Effective {
         let text = format!(
             "[device]\nrole = \"master-control\"\nmanufacturer = \"ACME\"\nserial-number = \"m\"\n\
-             [vehicles]\nmanufacturer = \"ACME\"\nserial-numbers = [\"a-1\", \"a-2\"]\n{others}"
+             [vehicles]\nmanufacturer = \"ACME\"\nserial-numbers = {serials}\n{others}"
         );
         let hooks = &tck_testing::library().rules.hooks;
         tck_profile::check(&Source::new("device.toml", text), std::path::Path::new(""), hooks).expect("a profile")
@@ -393,6 +397,17 @@ mod tests {
         let wrong = DeviceUnderTest::of_profile(&effective, packs, packs.latest(), None);
         let wrong = wrong.expect_err("there is no pack for 1.1");
         assert!(wrong[0].title.contains("1.1") && wrong[0].span.is_some(), "{wrong:?}");
+    }
+
+    #[test]
+    fn no_vehicle_is_invented_beside_the_one_that_a_profile_names() {
+        let packs = &tck_testing::library().rules.packs;
+        let effective = commanding("[\"a-1\"]", "");
+        let count = |asked: Option<usize>| {
+            let device = DeviceUnderTest::of_profile(&effective, packs, packs.latest(), asked).expect("a device");
+            device.fleet.expect("a fleet").vehicles.len()
+        };
+        assert_eq!((count(None), count(Some(3))), (1, 3));
     }
 
     #[test]

@@ -140,7 +140,7 @@ records! {
         => refusing(|agv, _, _| agv.order.edges.retain(|edge| edge.released));
     fault "malformed-stops-order" ["ORD-FLOW-12", "ORD-REJ-01"] "Gives its order up when an update breaks the schema."
         => refusing(|agv, message, rule| if rule == Rule::Malformed && message.is_object() { agv.give_up_order() });
-    fault "dumb-after-malformed" ["STATE-02", "ORD-REJ-02"] "It sends nothing more after a malformed order until it is switched off and on, and stays connected."
+    fault "dumb-after-malformed" ["ORD-REJ-02", "ORD-REJ-17", "STATE-02"] "It sends nothing more after a malformed order until it is switched off and on, and stays connected."
         => keep::<bool>()
             .refuses(|dumb, _, _, rule| *dumb |= rule == Rule::Malformed)
             .happens(|dumb, _, event| *dumb &= event != Event::PowerCycled)
