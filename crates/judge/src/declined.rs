@@ -52,9 +52,14 @@ impl Declined {
         }
     }
 
-    /// The hook of this name was run.
-    pub(super) fn does(&mut self, hook: &str) {
-        self.0.take_if(|(declined, _)| declined.hook == hook);
+    /// A hook was run well: by this step, or by one that awaits something and has it asked for once more.
+    pub(super) fn does(&mut self, hook: &str, step: &Step) {
+        let by = match &*step.verb {
+            Verb::Operator(operator) => Some(vehicle(operator)),
+            _ => None,
+        };
+        self.0
+            .take_if(|(declined, _)| declined.hook == hook && by.is_none_or(|by| by == vehicle(declined)));
     }
 
     /// What has to be asked for once more before this step can await what it does, and why it was declined.
@@ -62,4 +67,10 @@ impl Declined {
         let declined = self.0.as_ref()?;
         (Awaits::of(step, pack) == Some(Awaits::Something)).then_some(declined)
     }
+}
+
+/// The variables that say which vehicle is meant; none for the first one.
+fn vehicle(operator: &Operator) -> Vec<&str> {
+    let named = operator.with.iter().find(|(name, _)| name == "vehicle");
+    named.map_or_else(Vec::new, |(_, term)| term.variables())
 }

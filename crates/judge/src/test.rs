@@ -177,8 +177,8 @@ impl TestJudge {
         if let Some(span) = &mut self.result.journal {
             span.1 = entry.seq();
         }
-        if let Event::Hook { hook, ok: true, .. } = entry.event() {
-            self.declined.does(hook);
+        if let (Event::Hook { hook, ok: true, .. }, Some(running)) = (entry.event(), &self.running) {
+            self.declined.does(hook, &running.step);
         }
         match entry.event() {
             Event::StepBegun { path } => self.step_begun(path, entry, timeline, ground),
