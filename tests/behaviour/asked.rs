@@ -44,6 +44,7 @@ fn a_repetition_that_was_not_done_leaves_the_test_undecided() {
     let bench = Bench::new();
     let profile = Profile {
         motion: true,
+        one_way: true,
         ..Profile::default()
     };
     let (run, port) = bench.start(&profile, &[DRIVES, "--repeat", "3"]);

@@ -20,6 +20,8 @@ pub struct Profile {
     pub device: String,
     pub bench: String,
     pub motion: bool,
+    /// No edge leads back.
+    pub one_way: bool,
     pub time: Vec<(&'static str, &'static str)>,
     pub more: String,
 }
@@ -30,6 +32,7 @@ impl Default for Profile {
             device: String::new(),
             bench: String::new(),
             motion: false,
+            one_way: false,
             time: vec![
                 ("connect", "20 s"),
                 ("drive", "20 s"),
@@ -63,6 +66,14 @@ impl Profile {
             .map(|(name, limit)| format!("{name} = \"{limit}\""))
             .collect();
         let time = time.join("\n");
+        let mut ways = vec![("A1", "A2"), ("A2", "A3"), ("A3", "A4")];
+        if !self.one_way {
+            ways.extend(ways.clone().iter().map(|(from, to)| (*to, *from)));
+        }
+        let edge =
+            |(from, to): &(&str, &str)| format!("  {{ id = \"{from}-{to}\", from = \"{from}\", to = \"{to}\" }},");
+        let edges: Vec<String> = ways.iter().map(edge).collect();
+        let edges = edges.join("\n");
         format!(
             r#"
 [device]
@@ -80,9 +91,7 @@ nodes = [
   {{ id = "A3", x = 0.0, y = 4.0, map = "reference-floor" }}, {{ id = "A4", x = 0.0, y = 6.0, map = "reference-floor" }},
 ]
 edges = [
-  {{ id = "A1-A2", from = "A1", to = "A2" }}, {{ id = "A2-A1", from = "A2", to = "A1" }},
-  {{ id = "A2-A3", from = "A2", to = "A3" }}, {{ id = "A3-A2", from = "A3", to = "A2" }},
-  {{ id = "A3-A4", from = "A3", to = "A4" }}, {{ id = "A4-A3", from = "A4", to = "A3" }},
+{edges}
 ]
 [time]
 {time}

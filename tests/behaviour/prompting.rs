@@ -258,7 +258,9 @@ fn without_a_terminal_it_is_said_that_nobody_can_be_asked() {
     let _agv = bench.agv(port, &[]);
     run.end()
         .code(3)
-        .prints("hook `emergency-stop` is a prompt, and nobody can be asked");
+        .prints("answer at a terminal, or over HTTP (--questions)");
+    let result = bench.result().to_string();
+    assert!(result.contains("is a prompt, and nobody can be asked"), "{result}");
 }
 
 #[test]

@@ -5,7 +5,7 @@
 use super::findings::PROGRAM;
 use tck_base::verdict::Verdict;
 use tck_profile::KnownFailure;
-use tck_result::RunResult;
+use tck_result::{MonitorFinding, RunResult, TestResult};
 
 /// A run, measured by a list of known failures.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -23,7 +23,8 @@ pub struct Measured {
 }
 
 /// Measures a run by a list. What else could not be decided in a test whose failures are all known follows from them;
-/// any other test that is inconclusive or an error stays so.
+/// any other test that is inconclusive or an error stays so. A test that is known bears what monitors find of the same requirement
+/// while it runs, too.
 #[must_use]
 pub fn measure(result: &RunResult, known: &[KnownFailure]) -> Measured {
     let today = result.started.get(..10).unwrap_or_default();
@@ -76,7 +77,8 @@ pub fn measure(result: &RunResult, known: &[KnownFailure]) -> Measured {
         let Some(verdict) = monitor.verdict else { continue };
         let mut left = Verdict::Pass;
         for finding in &monitor.findings {
-            if finding.verdict == Verdict::Fail && bears(&finding.requirement, &monitor.id) {
+            let mut borne = || bears(&finding.requirement, &monitor.id) || follows(finding, result, &valid);
+            if finding.verdict == Verdict::Fail && borne() {
                 continue;
             }
             if finding.verdict == Verdict::Fail {
@@ -102,6 +104,25 @@ pub fn measure(result: &RunResult, known: &[KnownFailure]) -> Measured {
         list.push(known.id.clone());
     }
     measured
+}
+
+/// Whether a monitor has found no more than what a known test failed for: the same requirement, at messages of that test alone.
+fn follows(finding: &MonitorFinding, result: &RunResult, known: &[&KnownFailure]) -> bool {
+    let fails = |test: &&TestResult| {
+        let decided = test.decisions.iter();
+        let failed = decided.filter(|decision| decision.verdict() == Verdict::Fail);
+        known.iter().any(|known| known.id == test.id)
+            && failed
+                .into_iter()
+                .any(|decision| decision.requirement == finding.requirement)
+    };
+    let tests: Vec<&TestResult> = result.tests.iter().filter(fails).collect();
+    let within = |number: &u64| {
+        let spans = tests.iter().filter_map(|test| test.journal);
+        spans.into_iter().any(|(first, last)| (first..=last).contains(number))
+    };
+    // Of what happened often, only the first places are kept.
+    finding.count == finding.first.len() as u64 && finding.first.iter().all(within)
 }
 
 impl Measured {

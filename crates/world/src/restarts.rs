@@ -8,8 +8,9 @@ use crate::observation::Observation;
 
 /// Tells a new connection from one that goes on, and a possible restart from a link that the harness broke.
 ///
-/// At the tap a connection is new when the vehicle opens it. Without a tap it is new when the vehicle speaks again after OFFLINE
-/// or CONNECTIONBROKEN: an ONLINE that is said once more is no sign of anything.
+/// At the tap a connection is new when the vehicle opens it. Without a tap it is new when the vehicle speaks again after OFFLINE,
+/// CONNECTIONBROKEN or a connection message that cannot be read, which may have said either: an ONLINE that is said once more is
+/// no sign of anything.
 ///
 /// A vehicle that counts its headerId on over a cut of ours has not been started anew, and has no reason to forget
 /// anything. Every other new connection may be a restart.
@@ -17,7 +18,7 @@ use crate::observation::Observation;
 pub struct Restarts {
     /// The harness has disturbed the link since the last state.
     cut: bool,
-    /// The last connection message says that the vehicle is gone.
+    /// The last connection message does not say that the vehicle is there.
     gone: bool,
     /// The vehicle connected again behind a cut; the next state tells what it is.
     pending: bool,
@@ -75,8 +76,7 @@ impl Restarts {
         // What the broker kept from before tells whether the vehicle was gone, but not that it is back.
         let stored = record.is(Seen::Stored, Topic::Connection);
         let heard = record.is_delivered(Topic::Connection);
-        let said = record.connection_message().filter(|_| stored || heard);
-        if said.is_some_and(|message| message.is_gone()) {
+        if (stored || heard) && !record.connection_message().is_some_and(|message| message.is_online()) {
             self.gone = true;
             return false;
         }
