@@ -121,7 +121,8 @@ fn nothing_is_undecided_by_hooks_that_refuse_truthfully() {
     let declines = |id: &str| DECLINING.iter().any(|group| id.starts_with(group));
     request.tests.retain(|test| declines(&test.id));
     let results = run_all(&library, pack, &[request]);
-    let declined = |step: &vda5050_tck::result::StepResult| step.verb.starts_with("operator") && step.outcome == "failed";
+    let declined =
+        |step: &vda5050_tck::result::StepResult| step.verb.starts_with("operator") && step.outcome == "failed";
     let steps = results[0].tests.iter().flat_map(|test| &test.steps);
     assert!(steps.filter(|step| declined(step)).count() > 10, "little was declined");
     match blemishes(&results[0]) {
