@@ -4,6 +4,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use vda5050_tck::journal::event::Event;
 use vda5050_tck::judge::Library;
 use vda5050_tck::pack::Pack;
 use vda5050_tck::qualify::on_all_cores;
@@ -110,6 +111,70 @@ fn every_test_that_is_not_about_a_lasting_mistake_is_decided_as_without_it() {
     let stale = (0..rows.len()).filter(|row| !needed.contains(row));
     wrong.extend(stale.map(|row| format!("not needed: {}\n", rows[row].join("\t"))));
     assert!(wrong.is_empty(), "decided otherwise:\n{wrong}");
+}
+
+/// A test that is tried once more says nothing that was said before: a vehicle that takes the same order for one it has is right.
+#[test]
+fn a_test_that_is_tried_once_more_has_ids_of_its_own() {
+    let library = vda5050_tck::library(None).unwrap_or_else(|all| panic!("{all:?}"));
+    let pack = library.rules.packs.get("2.1.0").unwrap();
+    let mut request = VirtualRun {
+        faults: vec!["finished-order-listed".to_owned()],
+        ..VirtualRun::of(&library, pack)
+    };
+    request.tests.retain(|test| test.id.starts_with("order-acceptance/"));
+    let finished = run_silently(&library, pack, request).unwrap();
+    let mut sent: BTreeMap<String, usize> = BTreeMap::new();
+    let (mut begun, mut again) = (Vec::new(), 0);
+    for entry in finished.recorder.journal().entries() {
+        match entry.event() {
+            Event::TestBegun { test, .. } => {
+                again += usize::from(begun.contains(test));
+                begun.push(test.clone());
+            }
+            Event::Sent { topic, payload, .. } if topic.ends_with("/order") => {
+                let order: serde_json::Value = serde_json::from_slice(payload.bytes()).unwrap_or_default();
+                if let Some(order) = order["orderId"].as_str().map(str::to_owned) {
+                    let first = *sent.entry(order.clone()).or_insert(begun.len());
+                    assert_eq!(first, begun.len(), "{order} is sent in {:?} and before", begun.last());
+                }
+            }
+            _ => {}
+        }
+    }
+    assert!(again > 0, "no test was tried once more");
+}
+
+/// A vehicle that a message strikes dumb is started again before the next test, and no later test is blamed for it.
+#[test]
+fn a_vehicle_that_falls_silent_is_blamed_where_it_did() {
+    let library = vda5050_tck::library(None).unwrap_or_else(|all| panic!("{all:?}"));
+    let pack = library.rules.packs.get("2.1.0").unwrap();
+    let mut request = VirtualRun {
+        faults: vec!["dumb-after-malformed".to_owned()],
+        ..VirtualRun::of(&library, pack)
+    };
+    let strikes =
+        |id: &str| id.starts_with("order-rejection/schema-at-rest") || id.starts_with("order-rejection/unreadable");
+    request
+        .tests
+        .retain(|test| strikes(&test.id) || test.id.starts_with("order-update/"));
+    let finished = run_silently(&library, pack, request).unwrap();
+    let (mut struck, mut behind) = (false, 0);
+    for test in finished.result.tests.iter().filter(|test| test.verdict.is_some()) {
+        if strikes(&test.id) {
+            struck = true;
+            continue;
+        }
+        assert_eq!(test.verdict, Some(Verdict::Pass), "{}: {:?}", test.id, test.reason);
+        behind += usize::from(struck);
+    }
+    assert!(behind > 5, "only {behind} tests came behind it");
+    let limits = &finished.result.limits;
+    assert!(
+        limits.iter().any(|limit| limit.contains("has said nothing since")),
+        "{limits:?}"
+    );
 }
 
 #[test]

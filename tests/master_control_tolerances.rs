@@ -120,6 +120,36 @@ fn with_each_tolerance_nothing_fails() {
     );
 }
 
+/// Where nothing must be sent, to decline what a hook asks for is the best answer there is, and decides; what is awaited elsewhere
+/// is asked for again when the vehicle is there.
+#[test]
+fn nothing_is_undecided_by_hooks_that_refuse_truthfully() {
+    let library = vda5050_tck::library(None).unwrap();
+    let pack = library.rules.packs.latest();
+    let mut request = with(&library, pack, &["declines-what-it-may-not-send"]);
+    let declines = |id: &str| DECLINING.iter().any(|group| id.starts_with(group));
+    request.tests.retain(|test| declines(&test.id));
+    let results = run_all(&library, pack, &[request]);
+    let declined =
+        |step: &vda5050_tck::result::StepResult| step.verb.starts_with("operator") && step.outcome == "failed";
+    let steps = results[0].tests.iter().flat_map(|test| &test.steps);
+    assert!(steps.filter(|step| declined(step)).count() > 10, "little was declined");
+    match blemishes(&results[0]) {
+        Ok(mild) => assert!(mild.is_empty(), "{mild:#?}"),
+        Err(worse) => panic!("{worse}"),
+    }
+}
+
+/// Groups of tests in which a master control is asked for what it must not do.
+const DECLINING: [&str; 6] = [
+    "connection/",
+    "modes/",
+    "traffic/",
+    "reported/",
+    "capabilities/",
+    "cancel/",
+];
+
 /// What is not a pass with a tolerance, as [`accused`] words it, and why it cannot be.
 fn undecided() -> BTreeMap<String, String> {
     let table = include_str!("imperfect/master-control-undecided.tsv");

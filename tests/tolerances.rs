@@ -190,7 +190,7 @@ fn whatever_liberties_it_takes_nothing_fails() {
 
 /// Liberties that were once taken for defects only together: what a slow or talkative vehicle reports of its own
 /// falls into the time of an answer.
-const TOGETHER: [&[&str]; 11] = [
+const TOGETHER: [&[&str]; 12] = [
     &["answers-slowly", "states-often", "warning-comes-and-goes"],
     &["answers-very-slowly", "every-state-twice", "warning-comes-and-goes"],
     &[
@@ -222,6 +222,8 @@ const TOGETHER: [&[&str]; 11] = [
     // What makes it slow, whichever was taken first.
     &["actions-at-once", "states-coalesced"],
     &["actions-last", "answers-very-slowly"],
+    // An ONLINE with every breath is a sign of nothing.
+    &["online-behind-every-state", "states-often"],
     // The first node of an order is still to come, and the last node is that of the order before.
     &["first-node-listed", "header-id-restarts"],
 ];

@@ -69,8 +69,9 @@ pub fn hook(hook: &HookInfo, hooks: &Hooks, tests: usize) -> String {
     let refusals = REFUSALS.map(|code| code.to_string()).join(", ");
     let _ = write!(
         text,
-        "\nAnswers: 2xx is done; {refusals}: the device has understood and does not do it, which leaves the test\n\
-         inconclusive; anything else, or nothing in time, is an error of the bench. A program is done when it ends with 0.\n"
+        "\nAnswers: 2xx is done; {refusals}: the device has understood and does not do it, which is right where a master\n\
+         control must send nothing, and else leaves the test inconclusive; anything else, or nothing in time, is an error of the\n\
+         bench. A program is done when it ends with 0.\n"
     );
     text
 }

@@ -98,8 +98,26 @@ pub enum Output {
     Raw(Vec<u8>),
 }
 
+/// What became of a command.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Commanded {
+    /// The device has it.
+    Taken,
+    /// The device does not do it, and says why.
+    Declined(String),
+    /// There is no such device, or it is not running any more.
+    Nobody,
+}
+
 /// A device as a state machine without sockets and clock.
 pub trait Device {
+    /// Why it does not do what a command asks of it; `None` when it does. What it declines is not given to it as
+    /// [`Input::Command`].
+    fn declines(&self, name: &str, arguments: &serde_json::Value) -> Option<String> {
+        let _ = (name, arguments);
+        None
+    }
+
     /// How to connect now. Called at every connection attempt.
     fn connect_options(&mut self, now: Stamp) -> ConnectOptions;
 

@@ -345,6 +345,16 @@ mod tests {
     }
 
     #[test]
+    fn other_digit_counts_are_told_once() {
+        let all = [
+            "2026-01-01T12:00:00.000Z",
+            "2026-01-01T12:00:01.000Z",
+            "2026-01-01T12:00:02Z",
+        ];
+        assert_eq!(timestamps(&all), ["HDR-03 warning"]);
+    }
+
+    #[test]
     fn a_time_that_stands_still_and_local_time_with_a_z_are_found() {
         let mut trace = Trace::subscriber();
         for _ in 0..4 {

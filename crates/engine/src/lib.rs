@@ -348,6 +348,9 @@ impl<L: Link, O: Operator> Engine<L, O> {
         section: Section,
         watcher: &mut dyn Watcher,
     ) -> Result<StepEnd, EngineError> {
+        if let Some(declined) = self.ask_again(step, section).await? {
+            return Ok(declined);
+        }
         match &*step.verb {
             Verb::Send(send) => {
                 if send.topic == "order" {

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use serde_json::{Map, Value};
 
+use tck_base::device::Commanded;
 use tck_net::link::Link;
 
 /// What became of a hook.
@@ -94,9 +95,9 @@ pub trait Operator {
 
 /// Gives the command to the device on the link.
 pub(super) fn on_link<L: Link>(link: &mut L, hook: &str, parameters: &Map<String, Value>) -> HookOutcome {
-    if link.command(hook, Value::Object(parameters.clone())) {
-        HookOutcome::Done("done by the simulated device".to_owned())
-    } else {
-        HookOutcome::Missing
+    match link.command(hook, Value::Object(parameters.clone())) {
+        Commanded::Taken => HookOutcome::Done("done by the simulated device".to_owned()),
+        Commanded::Declined(why) => HookOutcome::Refused(why),
+        Commanded::Nobody => HookOutcome::Missing,
     }
 }

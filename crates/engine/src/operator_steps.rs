@@ -95,6 +95,21 @@ impl<L: Link, O: Operator> Engine<L, O> {
         })
     }
 
+    /// Asks a master control once more for what it has declined, before a step awaits what comes of it. What it still declines ends
+    /// the step.
+    pub(super) async fn ask_again(&mut self, step: &Step, section: Section) -> Result<Option<StepEnd>, EngineError> {
+        let judge = self.recorder.judge();
+        let test = judge.current().filter(|_| section == Section::Steps);
+        let Some((operator, why)) = test.and_then(|test| test.declined_before(step, judge.ground()).cloned()) else {
+            return Ok(None);
+        };
+        // What has changed since has to be seen first.
+        let settled = self.link.now().moment + judge.ground().time.settle;
+        self.watch(settled, |_| false).await?;
+        let end = self.operate(&operator, (section, false)).await?;
+        Ok((end != StepEnd::Decided).then_some(StepEnd::Refused(why)))
+    }
+
     /// Whether a master control has had connections, and now has none, though nobody keeps it away.
     fn master_control_is_gone(&self) -> bool {
         let judge = self.recorder.judge();

@@ -65,6 +65,8 @@ pub enum Reason {
     },
     /// The profile names no map file.
     NoMapFile,
+    /// The profile names one vehicle for a master control.
+    OneVehicle,
     /// The profile does not allow motion.
     MotionNotAllowed,
     /// Motion was ruled out for this run.
@@ -253,6 +255,7 @@ impl fmt::Display for Reason {
                 write!(f, "the profile does not say whether the device is `{statement}`")
             }
             Self::StatedFalse { statement } => write!(f, "`device.{statement}` is false in the profile"),
+            Self::OneVehicle => f.write_str("it needs a second vehicle, and the profile names one"),
             Self::NoActiveMap => f.write_str("the first state shows no enabled map on which the vehicle stands"),
             Self::MapServerUnreachable { host } => write!(
                 f,

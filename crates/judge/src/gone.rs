@@ -150,6 +150,11 @@ impl Pulse {
         (!self.disturbed && self.said.is_none()).then_some(at)
     }
 
+    /// What it was sent since its last word, and when its silence about that is longer than it ever should be.
+    pub(super) fn unanswered(&self) -> Option<(Mark, Moment)> {
+        Some((self.unanswered?, self.falls_silent()?))
+    }
+
     /// How the device is gone at this moment, if it is.
     pub(super) fn gone(&self, now: Moment) -> Option<Gone> {
         if self.said.is_some() {

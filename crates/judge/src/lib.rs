@@ -10,6 +10,7 @@ mod clause_outcome;
 mod clients;
 mod conversation_coverage;
 mod decide;
+mod declined;
 mod delivery;
 mod disconnect;
 mod eval_context;

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use super::decide::decide;
+use super::declined::{Declined, is_an_answer};
 use super::disconnect::Disconnect;
 use super::eval_context::EvalContext;
 use super::gone::Gone;
@@ -25,7 +26,7 @@ use tck_journal::event::{Event, StepEnd};
 use tck_journal::{Entry, Reason};
 use tck_pack::Role;
 use tck_result::{Decision, Sent, StepResult, TestResult, Waited};
-use tck_suite::model::{Section, Step, Test, Verb};
+use tck_suite::model::{Operator, Section, Step, Test, Verb};
 
 /// A test being judged.
 pub struct TestJudge {
@@ -57,8 +58,7 @@ pub struct TestJudge {
     sent: Option<Sent>,
     /// The order that the vehicle still had when the last order was sent to it.
     busy: Option<OrderUnderWay>,
-    /// A master control has declined what a hook asked of it. What it must not send can still be judged.
-    declined: Option<String>,
+    declined: Declined,
     ended: bool,
 }
 
@@ -115,9 +115,15 @@ impl TestJudge {
             open: Vec::new(),
             sent: None,
             busy: None,
-            declined: None,
+            declined: Declined::default(),
             ended: false,
         }
+    }
+
+    /// What a master control has declined and has to be asked for once more, before this step awaits what comes of it; and why it was
+    /// declined.
+    pub fn declined_before(&self, step: &Step, ground: &Ground) -> Option<&(Operator, String)> {
+        self.declined.before(step, &ground.pack)
     }
 
     /// The test.
@@ -170,6 +176,9 @@ impl TestJudge {
         self.departure.observe(entry, subject, ground.pack.names());
         if let Some(span) = &mut self.result.journal {
             span.1 = entry.seq();
+        }
+        if let (Event::Hook { hook, ok: true, .. }, Some(running)) = (entry.event(), &self.running) {
+            self.declined.does(hook, &running.step);
         }
         match entry.event() {
             Event::StepBegun { path } => self.step_begun(path, entry, timeline, ground),
@@ -253,11 +262,7 @@ impl TestJudge {
         else {
             return;
         };
-        let is_answer = ground.role == Role::MasterControl
-            && section == Section::Steps
-            && self
-                .next_waiting(&step)
-                .is_some_and(|next| matches!(*next.verb, Verb::Never(_)));
+        let is_answer = section == Section::Steps && is_an_answer(&step, &self.test, &ground.pack);
         let cut_short = match end {
             StepEnd::Decided | StepEnd::Deadline => None,
             StepEnd::Declined(_) if is_answer => None,
@@ -276,20 +281,11 @@ impl TestJudge {
         }
         match end {
             StepEnd::Broken(why) => self.broken(section, &step, why),
-            StepEnd::Declined(why) if is_answer => self.declined = Some(why.clone()),
+            StepEnd::Declined(why) if is_answer => self.declined.says(&step, why),
             StepEnd::Refused(why) | StepEnd::Declined(why) | StepEnd::Skipped(why) => {
                 self.refused(section, &step, why);
             }
             _ => {}
-        }
-        // What is awaited beyond what must not come does not come of something that was declined.
-        if let Some(why) = self.declined.clone()
-            && self
-                .next_waiting(&step)
-                .is_some_and(|next| !matches!(*next.verb, Verb::Never(_)))
-            && !is_answer
-        {
-            self.refused(section, &step, &why);
         }
         if let Verb::Send(send) = &*step.verb {
             let since = self.entries.partition_point(|entry| entry.seq() < begun.0);
@@ -386,24 +382,6 @@ impl TestJudge {
             Section::Steps => self.body = Err(format!("{}: {why}", step.path)),
             Section::Finally => {}
         }
-    }
-
-    /// The next step of the test that waits for messages, behind this one.
-    fn next_waiting(&self, step: &Step) -> Option<&Step> {
-        let behind = self
-            .test
-            .steps
-            .iter()
-            .skip_while(|other| other.path != step.path)
-            .skip(1);
-        let mut waiting = behind.filter(|step| {
-            let verb = &*step.verb;
-            matches!(
-                verb,
-                Verb::Never(_) | Verb::Expect(_) | Verb::Always(_) | Verb::Action(_) | Verb::Retained(_)
-            )
-        });
-        waiting.next()
     }
 
     fn broken(&mut self, section: Section, step: &Step, why: &str) {

@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::gone::{Gone, Pulse};
+use super::gone::{Gone, Mark, Pulse};
 use tck_base::clock::{Moment, Stamp};
 use tck_journal::Entry;
 use tck_journal::event::{Direction, Event, MockVehicle, Packet};
@@ -107,6 +107,12 @@ impl Timeline {
     #[must_use]
     pub fn gone(&self, now: Moment) -> Option<Gone> {
         self.pulse.gone(now)
+    }
+
+    /// The first message the device was sent since its last word, and when its silence about that is longer than it ever should be.
+    #[must_use]
+    pub fn unanswered(&self) -> Option<(Mark, Moment)> {
+        self.pulse.unanswered()
     }
 
     /// When the vehicle under test is silent for too long, if nothing comes before.

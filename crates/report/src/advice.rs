@@ -24,6 +24,9 @@ pub(super) fn remedy(reason: &Reason) -> Option<String> {
         Reason::MapServerUnreachable { .. } | Reason::MapServerElsewhere { .. } => {
             "[bench] maps-listen and maps-host: let the device reach the map server".to_owned()
         }
+        Reason::OneVehicle => {
+            "[vehicles] serial-numbers = […, …]: name another vehicle that the master control knows".to_owned()
+        }
         Reason::NoTap => "connect the device to the address of [bench] listen, and leave `tap = false` out".to_owned(),
         Reason::NoFactsheet { capability } | Reason::NoList { capability } => {
             let claims = if capability.starts_with("limit ") {

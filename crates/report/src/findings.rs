@@ -1,7 +1,10 @@
 //! What a device breaks, requirement by requirement: the rows that stand directly below the headline.
 //!
-//! A row joins what tests and monitors found of one requirement, so that one mistake is one row however many tests saw it.
+//! A row joins what tests and monitors found of one requirement, so that one mistake is one row however many tests saw it. A
+//! requirement of which nothing else was seen than what was seen of another one follows from that, and stands behind it.
 //! A program that ended by itself has a row of its own: no requirement says so, and no device may do it.
+
+use std::collections::BTreeSet;
 
 use super::sources::Sources;
 use tck_base::verdict::Verdict;
@@ -35,7 +38,13 @@ pub struct Finding<'a> {
     pub tests: Vec<&'a str>,
     /// The monitors that found it.
     pub monitors: Vec<&'a str>,
+    /// The requirement it follows from: all that was seen of it was seen of that one, by the same clauses in the same messages.
+    pub follows: Option<&'a str>,
+    sightings: BTreeSet<Sighting>,
 }
+
+/// A sighting: the clause of a test or the monitor, the message, and in which words.
+type Sighting = (String, Option<u64>, String);
 
 /// The findings of a run: what is broken before what is only remarked on, then by the number of tests that found it.
 #[must_use]
@@ -58,6 +67,8 @@ pub fn findings<'a>(result: &'a RunResult, sources: &'a Sources) -> Vec<Finding<
                 .witness
                 .or(decision.nearest.as_ref().map(|nearest| nearest.seq));
             finding.see(decision.verdict(), 1, at, Seen::of(seen, decision.sent.as_ref()));
+            let clause = format!("{} {}", test.id, decision.clause);
+            finding.sightings.insert((clause, at, decision.message.clone()));
             if !finding.tests.contains(&test.id.as_str()) {
                 finding.tests.push(&test.id);
             }
@@ -72,6 +83,10 @@ pub fn findings<'a>(result: &'a RunResult, sources: &'a Sources) -> Vec<Finding<
                 found.first.first().copied(),
                 Seen::of(found.message.clone(), None),
             );
+            let first = found.first.first().copied();
+            finding
+                .sightings
+                .insert((monitor.id.clone(), first, found.message.clone()));
             if !finding.monitors.contains(&monitor.id.as_str()) {
                 finding.monitors.push(&monitor.id);
             }
@@ -93,10 +108,41 @@ pub fn findings<'a>(result: &'a RunResult, sources: &'a Sources) -> Vec<Finding<
             first: program.first().map(|end| end.seq),
             tests: Vec::new(),
             monitors: Vec::new(),
+            follows: None,
+            sightings: BTreeSet::new(),
         });
     }
     all.sort_by_key(|finding| std::cmp::Reverse((finding.verdict, finding.tests.len() + finding.monitors.len())));
-    all
+    behind_their_causes(all)
+}
+
+/// Says of each finding from which one before it follows, and puts it behind that one.
+fn behind_their_causes(mut all: Vec<Finding<'_>>) -> Vec<Finding<'_>> {
+    for at in 1..all.len() {
+        let (before, rest) = all.split_at(at);
+        let explains = |cause: &&Finding<'_>, finding: &Finding<'_>| {
+            let known = !finding.sightings.is_empty() && finding.sightings.is_subset(&cause.sightings);
+            known && cause.follows.is_none() && finding.count <= cause.count
+        };
+        let cause = rest
+            .first()
+            .and_then(|finding| before.iter().find(|cause| explains(cause, finding)));
+        let Some(cause) = cause.map(|cause| cause.requirement) else {
+            continue;
+        };
+        let finding = &mut all[at];
+        finding.follows = Some(cause);
+        finding.seen = format!("follows from {cause}: {}", finding.seen);
+    }
+    let (causes, mut others): (Vec<_>, Vec<_>) = all.into_iter().partition(|finding| finding.follows.is_none());
+    let mut ordered = Vec::new();
+    for cause in causes {
+        let own = others.extract_if(.., |finding| finding.follows == Some(cause.requirement));
+        let own: Vec<_> = own.collect();
+        ordered.push(cause);
+        ordered.extend(own);
+    }
+    ordered
 }
 
 /// A sighting, and what was sent before it.
@@ -145,6 +191,8 @@ fn row<'a, 'r>(all: &'r mut Vec<Finding<'a>>, id: &'a str, sources: &'a Sources)
             first: None,
             tests: Vec::new(),
             monitors: Vec::new(),
+            follows: None,
+            sightings: BTreeSet::new(),
         });
         all.len() - 1
     });
@@ -167,7 +215,44 @@ mod tests {
             first: None,
             tests: Vec::new(),
             monitors: Vec::new(),
+            follows: None,
+            sightings: BTreeSet::new(),
         }
+    }
+
+    fn seen(requirement: &'static str, sightings: &[(&str, u64)]) -> Finding<'static> {
+        let mut finding = Finding { requirement, ..empty() };
+        for (clause, message) in sightings {
+            let text = format!("wrong in {message}");
+            finding.see(Verdict::Fail, 1, Some(*message), Seen::of(text.clone(), None));
+            finding.sightings.insert(((*clause).to_owned(), Some(*message), text));
+        }
+        finding
+    }
+
+    #[test]
+    fn what_is_seen_of_another_requirement_alone_stands_behind_it() {
+        let all = vec![
+            seen("A-1", &[("monitor", 3), ("test", 9)]),
+            seen("B-1", &[("other", 4)]),
+            seen("A-2", &[("monitor", 3)]),
+            seen("B-2", &[("other", 4), ("test", 12)]),
+            seen("A-3", &[("elsewhere", 3)]),
+            seen("A-4", &[("monitor", 3)]),
+        ];
+        let rows = behind_their_causes(all);
+        let rows: Vec<_> = rows.iter().map(|one| (one.requirement, one.follows)).collect();
+        let expected = [
+            ("A-1", None),
+            ("A-2", Some("A-1")),
+            ("A-4", Some("A-1")),
+            ("B-1", None),
+            ("B-2", None),
+            ("A-3", None),
+        ];
+        assert_eq!(rows, expected);
+        let one = behind_their_causes(vec![seen("A-1", &[("test", 3)]), seen("A-2", &[("test", 3)])]);
+        assert_eq!(one[1].seen, "follows from A-1: wrong in 3");
     }
 
     #[test]

@@ -158,7 +158,9 @@ pub fn annotations(result: &RunResult, sources: &Sources) -> String {
     if let Some(trouble) = statement::trouble(result) {
         let _ = writeln!(text, "::error title=vda5050-tck::{}", command(&trouble));
     }
-    for finding in findings(result, sources).iter().take(ANNOTATIONS) {
+    let found = findings(result, sources);
+    let causes = found.iter().filter(|finding| finding.follows.is_none());
+    for finding in causes.take(ANNOTATIONS) {
         let kind = if finding.verdict == Verdict::Fail {
             "error"
         } else {

@@ -13,6 +13,7 @@ use super::sheet::Sheet;
 use tck_base::pattern::{Term, TermKind};
 use tck_journal::event::{Capability, Gate};
 use tck_journal::{Reason, Vantage};
+use tck_pack::Role;
 use tck_profile::{SAMPLE_ACTIONS, SampleKind};
 use tck_suite::model::{Need, SendAction, ServeBehaviour, Test, Verb};
 
@@ -42,6 +43,8 @@ pub struct Capabilities {
     pub map_file: Result<(), Reason>,
     /// Whether the vehicle may drive; `Err` says why not.
     pub motion: Result<(), Reason>,
+    /// Whether a master control has a second mock vehicle beside the first.
+    pub second_vehicle: bool,
     /// Whether a claim may add to a factsheet that says otherwise. Not for a certificate.
     pub claims_add: bool,
 }
@@ -98,6 +101,9 @@ impl Capabilities {
             && let Err(why) = &self.motion
         {
             open.push(why.clone());
+        }
+        if test.device == Role::MasterControl && !self.second_vehicle && test.needs_second_vehicle() {
+            open.push(Reason::OneVehicle);
         }
         if serves_a_map_to_read(test)
             && let Err(why) = &self.map_file
@@ -336,6 +342,7 @@ mod tests {
             maps: Ok(()),
             map_file: Ok(()),
             motion: Ok(()),
+            second_vehicle: true,
             claims_add: true,
         }
     }
@@ -351,6 +358,27 @@ mod tests {
         Need::Action {
             name: "pick".to_owned(),
             scope: scope.map(str::to_owned),
+        }
+    }
+
+    #[test]
+    fn a_test_with_two_vehicles_needs_a_second_one() {
+        let library = tck_testing::library();
+        let tests = library.tests(Role::MasterControl, &library.rules.packs.latest().id);
+        let two: Vec<_> = tests.iter().filter(|test| test.needs_second_vehicle()).collect();
+        assert!(
+            two.len() > 10 && two.len() < tests.len() / 2,
+            "{} of {}",
+            two.len(),
+            tests.len()
+        );
+        let waits = |test: &Test, second: bool| {
+            let mut device = capabilities(None);
+            device.second_vehicle = second;
+            device.weigh(test).is_ok_and(|open| open.contains(&Reason::OneVehicle))
+        };
+        for test in two {
+            assert!(waits(test, false) && !waits(test, true), "{}", test.id);
         }
     }
 

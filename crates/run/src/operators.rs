@@ -10,6 +10,7 @@ use serde_json::{Map, Value};
 use super::device::{DeviceProcess, Surroundings};
 use super::hooks::{Means, ProfileHooks};
 use super::person::Person;
+use tck_base::device::Commanded;
 use tck_engine::{HookOutcome, Operator};
 use tck_net::link::mqtt::BenchInfo;
 use tck_profile::{self as profile, Profile};
@@ -95,10 +96,10 @@ impl Operator for Commands {
         if !self.hooks.contains(&hook) {
             return HookOutcome::Missing;
         }
-        if self.device.command(hook, Value::Object(parameters)).await {
-            HookOutcome::Done("done by the built-in device".to_owned())
-        } else {
-            HookOutcome::Failed("the built-in device is not running any more".to_owned())
+        match self.device.ask(hook, Value::Object(parameters)).await {
+            Commanded::Taken => HookOutcome::Done("done by the built-in device".to_owned()),
+            Commanded::Declined(why) => HookOutcome::Refused(why),
+            Commanded::Nobody => HookOutcome::Failed("the built-in device is not running any more".to_owned()),
         }
     }
 

@@ -122,6 +122,30 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         Ok(())
     }
 
+    /// Notices a vehicle that a message of this test has struck dumb, though its connection stands, and starts it again where that
+    /// is possible: the silence is the mistake of this test, and no later one is to be blamed for it.
+    pub(super) async fn outlast_silence(&mut self, test: &Test) -> Result<(), EngineError> {
+        let Some(((sent, _), until)) = self.engine.recorder.judge().timeline().unanswered() else {
+            return Ok(());
+        };
+        let speaks = |recorder: &tck_engine::Recorder| {
+            let unanswered = recorder.judge().timeline().unanswered();
+            unanswered.is_none_or(|((seq, _), _)| seq != sent)
+        };
+        if self.engine.interrupted() || self.engine.watch(until, speaks).await? {
+            return Ok(());
+        }
+        let why = format!("the vehicle has said nothing since it was sent #{sent}");
+        let mut limit = format!("In test {} {why}.", test.id);
+        if self.can_restart() && power_cycle(self, format!("{why}; it is restarted")).await?.is_ok() {
+            limit.push_str(" It was restarted, and the run went on.");
+        } else {
+            self.progress.note(&why);
+        }
+        self.setup.limits.push(limit);
+        Ok(())
+    }
+
     /// Brings the vehicle to rest, and gives what is still in the way.
     pub(super) async fn bring_to_rest(&mut self) -> Result<Vec<Obstacle>, EngineError> {
         if self.rests_within(self.time("settle")).await? {

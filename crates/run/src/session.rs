@@ -555,6 +555,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
         if !Presence::of(self.engine.recorder.judge(), self.setup.capabilities.vantage).is_there() {
             return Ok(());
         }
+        self.outlast_silence(test).await?;
         self.read_over(self.engine.link.now().moment).await?;
         let left = if self.obstacles().is_empty() {
             Vec::new()

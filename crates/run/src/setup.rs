@@ -21,8 +21,8 @@ use tck_pack::Participant;
 use tck_pack::{Pack, Packs, Role};
 use tck_profile::{Effective, Profile, TimeLimits};
 use tck_simulate::BuiltIn;
+use tck_simulate::Fleet;
 use tck_simulate::ReferenceAgv;
-use tck_simulate::{Fleet, USUAL_FLEET};
 
 /// What is known of the device under test before it is there.
 #[derive(Clone, Debug)]
@@ -79,7 +79,8 @@ impl DeviceUnderTest {
         }
     }
 
-    /// The device of a profile. A master control gets at least so many mock AGVs, and those of the profile.
+    /// The device of a profile. A master control gets at least so many mock AGVs, and those of the profile, which are all when
+    /// nothing is said.
     ///
     /// # Errors
     /// What the profile lacks, or a file that it names and that cannot be read.
@@ -96,7 +97,8 @@ impl DeviceUnderTest {
         let fleet = match subject.role {
             Role::Agv => None,
             Role::MasterControl => {
-                let mut fleet = fleet(profile, layout.as_ref(), vehicles.unwrap_or(USUAL_FLEET), pack);
+                // A vehicle that the profile does not name is none of the site's.
+                let mut fleet = fleet(profile, layout.as_ref(), vehicles.unwrap_or_default(), pack);
                 join_others(&mut fleet, profile, layout.as_ref(), (packs, pack))?;
                 Some(fleet)
             }
@@ -199,6 +201,7 @@ impl DeviceUnderTest {
             maps: bench.maps,
             map_file,
             motion: self.motion,
+            second_vehicle: vehicles > 1,
             claims_add: self.claims_add,
         };
         let setup = Setup {
@@ -314,7 +317,7 @@ fn join_others(
 fn fleet(profile: &Profile, layout: Option<&Layout>, vehicles: usize, pack: &Pack) -> Fleet {
     let like = mock(profile, layout, pack);
     let wanted = &profile.vehicles;
-    let count = vehicles.max(wanted.serial_numbers.len());
+    let count = vehicles.max(wanted.serial_numbers.len()).max(1);
     let mut fleet = Fleet::new(&like, &wanted.manufacturer, &wanted.serial_numbers, count, pack);
     if let (Some(vehicle), Some(node)) = (fleet.vehicles.first_mut(), &wanted.start_node) {
         vehicle.config.start_node.clone_from(node);
@@ -349,9 +352,13 @@ mod tests {
     use tck_judge::TrafficJudge;
 
     fn profile(others: &str) -> Effective {
+        commanding("[\"a-1\", \"a-2\"]", others)
+    }
+
+    fn commanding(serials: &str, others: &str) -> Effective {
         let text = format!(
             "[device]\nrole = \"master-control\"\nmanufacturer = \"ACME\"\nserial-number = \"m\"\n\
-             [vehicles]\nmanufacturer = \"ACME\"\nserial-numbers = [\"a-1\", \"a-2\"]\n{others}"
+             [vehicles]\nmanufacturer = \"ACME\"\nserial-numbers = {serials}\n{others}"
         );
         let hooks = &tck_testing::library().rules.hooks;
         tck_profile::check(&Source::new("device.toml", text), std::path::Path::new(""), hooks).expect("a profile")
@@ -390,6 +397,17 @@ mod tests {
         let wrong = DeviceUnderTest::of_profile(&effective, packs, packs.latest(), None);
         let wrong = wrong.expect_err("there is no pack for 1.1");
         assert!(wrong[0].title.contains("1.1") && wrong[0].span.is_some(), "{wrong:?}");
+    }
+
+    #[test]
+    fn no_vehicle_is_invented_beside_the_one_that_a_profile_names() {
+        let packs = &tck_testing::library().rules.packs;
+        let effective = commanding("[\"a-1\"]", "");
+        let count = |asked: Option<usize>| {
+            let device = DeviceUnderTest::of_profile(&effective, packs, packs.latest(), asked).expect("a device");
+            device.fleet.expect("a fleet").vehicles.len()
+        };
+        assert_eq!((count(None), count(Some(3))), (1, 3));
     }
 
     #[test]

@@ -15,7 +15,7 @@ use tokio::time::{Instant, sleep_until};
 use super::fetching::{Progress, fetch};
 use super::witness::{Witness, report};
 use tck_base::clock::{Moment, WallClock};
-use tck_base::device::{Device, Input, Output, Publication};
+use tck_base::device::{Commanded, Device, Input, Output, Publication};
 use tck_net::bench::client::{Client, ClientEvent, ClientOptions};
 use tck_net::bench::endpoint::Endpoint;
 use tck_net::link::mqtt::Reporter;
@@ -30,8 +30,8 @@ const ENTRY_LIMIT: Duration = Duration::from_secs(15);
 pub struct Command {
     name: String,
     parameter: Value,
-    /// Told when the device has it, so that what is sent next comes after it.
-    done: oneshot::Sender<()>,
+    /// Told when the device has it, so that what is sent next comes after it, or why it does not do it.
+    done: oneshot::Sender<Commanded>,
 }
 
 /// A device that runs in a task of its own.
@@ -73,15 +73,23 @@ impl RunningDevice {
         }
     }
 
-    /// Does something to the device, and waits until that is done. `false` when it is not running any more.
+    /// Does something to the device, and waits until that is done. `false` when it does not do it, or is not running any more.
     pub async fn command(&self, name: &str, parameter: Value) -> bool {
+        self.ask(name, parameter).await == Commanded::Taken
+    }
+
+    /// Does something to the device, and waits until that is done or declined.
+    pub async fn ask(&self, name: &str, parameter: Value) -> Commanded {
         let (done, heard) = oneshot::channel();
         let command = Command {
             name: name.to_owned(),
             parameter,
             done,
         };
-        self.commands.send(command).is_ok() && heard.await.is_ok()
+        match self.commands.send(command) {
+            Ok(()) => heard.await.unwrap_or(Commanded::Nobody),
+            Err(_) => Commanded::Nobody,
+        }
     }
 
     /// Ends the device with DISCONNECT.
@@ -158,9 +166,15 @@ impl<D: Device> Driver<D> {
                 Some((token, progress)) = progress.recv() => self.give(Input::Download { token, progress }).await,
                 command = commands.recv() => match command {
                     Some(command) => {
-                        self.give(Input::Command(command.name, command.parameter)).await;
+                        let commanded = match self.device.declines(&command.name, &command.parameter) {
+                            Some(why) => Commanded::Declined(why),
+                            None => {
+                                self.give(Input::Command(command.name, command.parameter)).await;
+                                Commanded::Taken
+                            }
+                        };
                         // Whoever asked may have stopped waiting.
-                        let _ = command.done.send(());
+                        let _ = command.done.send(commanded);
                     }
                     None => break,
                 },

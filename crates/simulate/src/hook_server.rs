@@ -1,7 +1,7 @@
 //! Hooks over HTTP: what a person would do at a simulated device, for scripts and for harnesses.
 //!
 //! `GET /` lists them; `POST /hooks/NAME` with a JSON object of parameters does one, and answers once the device
-//! has it.
+//! has it: 204, or 409 with the reason where the device does not do it.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -16,6 +16,7 @@ use tokio::sync::Mutex;
 use tokio::task::JoinHandle;
 
 use super::driver::RunningDevice;
+use tck_base::device::Commanded;
 use tck_net::bench::LinkError;
 use tck_net::bench::listen::listen_on;
 use tck_net::bench::patience::PatientListener;
@@ -104,17 +105,17 @@ impl Hooks {
             Err(why) => return (StatusCode::BAD_REQUEST, format!("{why}\n")),
         };
         let device = self.device.lock().await;
-        let done = match device.as_ref() {
-            Some(device) => device.command(name, Value::Object(parameters)).await,
-            None => false,
+        let commanded = match device.as_ref() {
+            Some(device) => device.ask(name, Value::Object(parameters)).await,
+            None => Commanded::Nobody,
         };
-        if done {
-            (StatusCode::NO_CONTENT, String::new())
-        } else {
-            (
+        match commanded {
+            Commanded::Taken => (StatusCode::NO_CONTENT, String::new()),
+            Commanded::Declined(why) => (StatusCode::CONFLICT, format!("{why}\n")),
+            Commanded::Nobody => (
                 StatusCode::SERVICE_UNAVAILABLE,
                 "the device is not running any more\n".to_owned(),
-            )
+            ),
         }
     }
 }

@@ -123,7 +123,10 @@ impl MalformedOrders {
                 if name.is_empty() {
                     self.nameless = [true; 2];
                 }
-                self.broken_ones.push_back((name, message.order_update_id.whole()));
+                // What a vehicle makes of a number of more than 32 bits is its own affair.
+                let update = message.order_update_id.whole();
+                let update = update.filter(|number| u32::try_from(*number).is_ok());
+                self.broken_ones.push_back((name, update));
                 let excess = self.broken_ones.len().saturating_sub(MESSAGES);
                 self.broken_ones.drain(..excess);
             }

@@ -394,6 +394,46 @@ mod tests {
         assert_eq!(moves(&[0.0, 0.0, 0.0]), ["MAP-01"]);
     }
 
+    /// A vehicle that stands at 0 throughout, and names these nodes as its last ones, each the first one of an order of its own.
+    fn stands(nodes: &[(&str, f64)]) -> Vec<String> {
+        let mut trace = Trace::subscriber();
+        for (number, (id, x)) in nodes.iter().enumerate() {
+            let place = json!({ "x": x, "y": 0.0, "mapId": "m" });
+            let node = json!({ "nodeId": id, "sequenceId": 0, "released": true, "nodePosition": place, "actions": [] });
+            let order = json!({ "orderId": number.to_string(), "orderUpdateId": 0, "nodes": [node], "edges": [] });
+            trace.sent("order", &order);
+            let mut state = at(0.0, 0.0, false);
+            state["orderId"] = order["orderId"].clone();
+            state["orderUpdateId"] = json!(0);
+            state["lastNodeId"] = json!(id);
+            state["lastNodeSequenceId"] = json!(0);
+            trace.wait(3.0).state(&state);
+        }
+        trace.judge("state/position-moves").summary()
+    }
+
+    #[test]
+    fn where_an_order_begins_nobody_has_driven() {
+        assert!(stands(&[("a", 0.0), ("b", 2.0), ("c", 4.0)]).is_empty());
+    }
+
+    #[test]
+    fn no_last_node_is_none() {
+        let mut trace = Trace::subscriber();
+        let node = |id: &str, x: f64| json!({ "nodeId": id, "nodePosition": { "x": x, "y": 0.0, "mapId": "m" } });
+        trace.sent(
+            "order",
+            &json!({ "orderId": "o", "nodes": [node("a", 0.0), node("", 4.0)] }),
+        );
+        for id in ["a", "", "a", ""] {
+            let mut state = at(0.0, 0.0, false);
+            state["lastNodeId"] = json!(id);
+            state["lastNodeSequenceId"] = json!(2);
+            trace.wait(3.0).state(&state);
+        }
+        assert!(trace.judge("state/position-moves").summary().is_empty());
+    }
+
     #[test]
     fn where_a_node_was_reached_is_not_known_of_a_vehicle_that_is_under_way_already() {
         let mut trace = Trace::subscriber();

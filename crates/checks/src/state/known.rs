@@ -408,6 +408,16 @@ mod tests {
     }
 
     #[test]
+    fn what_a_vehicle_makes_of_a_number_beyond_32_bits_is_not_judged() {
+        let mut trace = Trace::subscriber();
+        trace
+            .state(&json!({}))
+            .sent("order", &order("o", 1 << 32, &[("n1", true), ("n2", true)]));
+        trace.state(&shows("o", 0, ("n1", 0), &[("n2", 2, true)]));
+        assert!(trace.judge(CHECK).findings.is_empty());
+    }
+
+    #[test]
     fn an_update_id_that_falls_is_found() {
         let mut trace = Trace::subscriber();
         trace.state(&json!({}));

@@ -10,7 +10,7 @@ pub mod mqtt;
 
 use crate::bench::{LinkError, Offer};
 use tck_base::clock::{Moment, Stamp};
-use tck_base::device::Publication;
+use tck_base::device::{Commanded, Publication};
 use tck_journal::Vantage;
 use tck_journal::event::{LinkFault, Occurrence};
 
@@ -44,11 +44,10 @@ pub trait Link {
     /// Offers a file; returns its address as the device must use it.
     async fn serve(&mut self, offer: Offer) -> Result<String, LinkError>;
 
-    /// Gives a command to a simulated device that lives on this link; `false` when there is none or it
-    /// does not know the command.
-    fn command(&mut self, name: &str, parameters: serde_json::Value) -> bool {
+    /// Gives a command to a simulated device that lives on this link, if there is one.
+    fn command(&mut self, name: &str, parameters: serde_json::Value) -> Commanded {
         let _ = (name, parameters);
-        false
+        Commanded::Nobody
     }
 
     /// Sets a mock AGV of the harness that lives on this link; they are counted from 0. `false` when there is none

@@ -40,13 +40,7 @@ const MAX_BLOCKED: usize = 1000;
 
 impl MasterControl {
     pub(super) fn command(&mut self, name: &str, arguments: &Value) {
-        let serial = text(arguments, "vehicle");
-        let meant = |vehicle: &Vehicle| {
-            serial
-                .as_ref()
-                .is_none_or(|serial| *serial == vehicle.config.serial_number)
-        };
-        let index = self.fleet.iter().position(meant);
+        let index = self.meant(arguments);
         if !self.site.commanded(&mut self.fleet, name, arguments) {
             return;
         }
@@ -64,6 +58,19 @@ impl MasterControl {
                 }
             }
         }
+    }
+}
+
+impl MasterControl {
+    /// Which vehicle of the fleet a command is about.
+    pub(super) fn meant(&self, arguments: &Value) -> Option<usize> {
+        let serial = text(arguments, "vehicle");
+        let mut fleet = self.fleet.iter();
+        fleet.position(|vehicle| {
+            serial
+                .as_ref()
+                .is_none_or(|serial| *serial == vehicle.config.serial_number)
+        })
     }
 }
 

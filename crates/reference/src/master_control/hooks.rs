@@ -34,6 +34,8 @@ hooks! {
     mut commanded(fleet: &mut [Vehicle], command: &str, arguments: &Value) -> bool = all;
     /// Somebody asks for something, of a vehicle; false when it is done.
     mut asked of vehicle (vehicle: &mut Vehicle, command: &str, arguments: &Value) -> bool = all;
+    /// Why it does not do what somebody asks for, of a vehicle; it says so, and keeps nothing in mind.
+    ref declines of vehicle (vehicle: &Vehicle, command: &str, arguments: &Value) -> Option<String> = first;
     /// A message came in; false to drop it.
     mut hears of vehicle (vehicle: &mut Vehicle, heard: &mut Heard<'_>) -> bool = all;
     /// Something has happened, or is about to.

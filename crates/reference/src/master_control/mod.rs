@@ -223,6 +223,11 @@ impl Device for MasterControl {
         self.joining()
     }
 
+    fn declines(&self, name: &str, arguments: &serde_json::Value) -> Option<String> {
+        let vehicle = self.fleet.get(self.meant(arguments)?)?;
+        self.site.declines(vehicle, name, arguments)
+    }
+
     fn handle(&mut self, now: Stamp, input: Input, out: &mut Vec<Output>) {
         self.advance(now);
         match input {

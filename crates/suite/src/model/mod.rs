@@ -88,6 +88,13 @@ impl Test {
         }
         all
     }
+
+    /// Whether it speaks to, or of, a second mock vehicle.
+    #[must_use]
+    pub fn needs_second_vehicle(&self) -> bool {
+        let mut steps = self.sections().into_iter().flat_map(|(_, steps)| steps);
+        steps.any(|step| step.verb.concerns_second_vehicle())
+    }
 }
 
 /// A part of a test.

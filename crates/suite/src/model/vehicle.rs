@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::{Always, Expect, Never, Until};
+use super::{Always, Expect, Extent, Never, Until, Verb};
 use tck_base::pattern::Term;
 
 /// `vehicle:`.
@@ -59,6 +59,30 @@ macro_rules! subject {
 }
 
 subject!(Expect, Never, Always, Until);
+
+impl Verb {
+    /// Whether it speaks to, or of, a second mock vehicle.
+    #[must_use]
+    pub fn concerns_second_vehicle(&self) -> bool {
+        let of = match self {
+            Self::Expect(expect) => expect.of,
+            Self::Never(never) => never.of,
+            Self::Always(always) => match &always.extent {
+                Extent::Until(until) if until.of == Which::Second => until.of,
+                _ => always.of,
+            },
+            Self::Vehicle(vehicle) => vehicle.of,
+            _ => Which::First,
+        };
+        let with: &[(String, Term)] = match self {
+            Self::Operator(operator) => &operator.with,
+            Self::Vehicle(vehicle) => &vehicle.with,
+            _ => &[],
+        };
+        let mut names = with.iter().flat_map(|(_, term)| term.variables());
+        of == Which::Second || names.any(|name| name.split('.').next() == Some(Which::Second.word()))
+    }
+}
 
 #[cfg(test)]
 mod tests {

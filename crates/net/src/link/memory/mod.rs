@@ -22,7 +22,7 @@ use crate::bench::{LinkError, Offer};
 use crate::link::Link;
 use crate::tap::faults::{Change, Faults};
 use tck_base::clock::{Moment, Stamp};
-use tck_base::device::{Device, Download, Input, Output, Publication};
+use tck_base::device::{Commanded, Device, Download, Input, Output, Publication};
 use tck_journal::Vantage;
 use tck_journal::event::{Direction, Event, LinkFault, Occurrence, Payload, Source};
 
@@ -341,9 +341,15 @@ impl Link for MemoryLink {
         Ok(())
     }
 
-    fn command(&mut self, name: &str, parameters: serde_json::Value) -> bool {
+    fn command(&mut self, name: &str, parameters: serde_json::Value) -> Commanded {
+        let Some(plug) = self.plugs.first() else {
+            return Commanded::Nobody;
+        };
+        if let Some(why) = plug.peer.declines(name, &parameters) {
+            return Commanded::Declined(why);
+        }
         MemoryLink::command(self, 0, name, parameters);
-        true
+        Commanded::Taken
     }
 
     fn vehicle(&mut self, number: usize, what: &str, with: serde_json::Value) -> bool {

@@ -151,24 +151,12 @@ records! {
             _ => {}
         });
     fault "cancel-leaves-nodes" ["ORD-CANCEL-11", "STATE-13"] "Keeps the node and edge states of a cancelled order."
-        => keep::<Option<OrderState>>()
-            .happens(|before, agv, event| match event {
-                Event::CancelEnding => *before = Some(agv.order.clone()),
-                Event::Cancelled => if let Some(before) = before.take() {
-                    (agv.order.nodes, agv.order.edges, agv.order.entered) = (before.nodes, before.edges, before.entered);
-                    if before.cancel.is_some_and(|cancel| cancel.to_node) {
-                        // All that was left was this node.
-                        agv.order.nodes.extend(agv.order.left.0.clone());
-                    }
-                },
-                _ => {}
-            })
-            .raises(|_, agv, cause, _| {
-                if matches!(cause, Cause::NothingToCancel) {
-                    agv.order.drop_route();
-                }
-                true
-            });
+        => leaving_route();
+    fault "cancelled-order-stands" ["ORD-CANCEL-11", "STATE-13"] "Keeps the node and edge states of a cancelled order, and refuses new orders because of them until it is asked to cancel once more."
+        => leaving_route().objects(|_, agv, _, relation| {
+            let stands = relation == Relation::New && agv.order.cancelled && !agv.order.nodes.is_empty();
+            stands.then(|| Refusal::new(Rule::OtherOrderActive, "another order is active"))
+        });
     fault "cancel-clears-order-id" ["ORD-CANCEL-08", "STATE-MSG-02"] "Empties the orderId when the order is cancelled."
         => when(Event::Cancelled, |agv| agv.order.order_id.clear());
     fault "cancel-resets-update-id" ["ORD-CANCEL-08", "STATE-MSG-02"] "Sets the orderUpdateId back to 0 when the order is cancelled."
@@ -265,6 +253,31 @@ records! {
             e.life = Life::UntilNewOrder;
             true
         });
+}
+
+/// Keeps the nodes and edges of a cancelled order until it is asked to cancel once more.
+fn leaving_route() -> Box<Hooks<Option<OrderState>>> {
+    keep::<Option<OrderState>>()
+        .happens(|before, agv, event| match event {
+            Event::CancelEnding => *before = Some(agv.order.clone()),
+            Event::Cancelled => {
+                if let Some(before) = before.take() {
+                    (agv.order.nodes, agv.order.edges, agv.order.entered) =
+                        (before.nodes, before.edges, before.entered);
+                    if before.cancel.is_some_and(|cancel| cancel.to_node) {
+                        // All that was left was this node.
+                        agv.order.nodes.extend(agv.order.left.0.clone());
+                    }
+                }
+            }
+            _ => {}
+        })
+        .raises(|_, agv, cause, _| {
+            if matches!(cause, Cause::NothingToCancel) {
+                agv.order.drop_route();
+            }
+            true
+        })
 }
 
 fn of_edge(action: &Action) -> bool {

@@ -236,6 +236,10 @@ records! {
                 agv.motion.halt(agv.moment());
             }
         });
+    tolerance "crawls-offline" ["MQTT-04", "MQTT-05"] "While the link is down it drives every edge behind the first one of its order so slowly that it takes more than five seconds."
+        => planning(|agv, leg| if !agv.connection.online && leg.is_whole() && leg.stop.node.sequence_id > 2 {
+            leg.own = leg.own.min(leg.distance / 5.5);
+        });
     tolerance "semiautomatic-at-full-speed" ["MODE-03"] "It drives as fast in SEMIAUTOMATIC as in AUTOMATIC."
         => planning(|agv, leg| leg.own = agv.config.speed);
     tolerance "keeps-below-max-speed" ["ORD-MSG-20"] "It drives at four fifths of the maxSpeed of an edge."

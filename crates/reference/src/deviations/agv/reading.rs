@@ -82,6 +82,12 @@ records! {
                 *value = json!(wrapped(number));
             }
         }));
+    tolerance "large-numbers-cut" ["ORD-REJ-01"] "It keeps 32 bits of a number in an order that has more, and takes the order over."
+        => reading(|_, order| members(order, &|key, value| {
+            if WHOLE.contains(&key) && let Some(number) = value.as_u64().filter(|number| *number > u64::from(u32::MAX)) {
+                *value = json!(number & u64::from(u32::MAX));
+            }
+        }));
     fault "numbers-read-from-text" ["ORD-REJ-01", "ORD-REJ-02"] "It takes an order in which orderUpdateId or a sequenceId is a number in quotes."
         => reading(|_, order| {
             order.change("orderUpdateId", number_from_text);

@@ -140,6 +140,11 @@ records! {
         => refusing(|agv, _, _| agv.order.edges.retain(|edge| edge.released));
     fault "malformed-stops-order" ["ORD-FLOW-12", "ORD-REJ-01"] "Gives its order up when an update breaks the schema."
         => refusing(|agv, message, rule| if rule == Rule::Malformed && message.is_object() { agv.give_up_order() });
+    fault "dumb-after-malformed" ["ORD-REJ-02", "ORD-REJ-17", "STATE-02"] "It sends nothing more after a malformed order until it is switched off and on, and stays connected."
+        => keep::<bool>()
+            .refuses(|dumb, _, _, rule| *dumb |= rule == Rule::Malformed)
+            .happens(|dumb, _, event| *dumb &= event != Event::PowerCycled)
+            .allows(|dumb, _, what, usual| usual && !(*dumb && matches!(what, Permission::Say(..))));
     fault "missing-id-taken-over" ["ORD-REJ-01", "STATE-MSG-02"] "Reads a missing orderId as an empty one and reports it."
         => refusing(|agv, message, rule| {
             if rule == Rule::Malformed && message.is_object() && message.get("orderId").is_none() {

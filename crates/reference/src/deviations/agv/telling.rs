@@ -101,6 +101,8 @@ records! {
         => again(1);
     tolerance "online-again" ["CONN-05", "CONN-10"] "The vehicle publishes ONLINE again with every tenth state."
         => when(Event::StateSent, |agv| if agv.states_sent.is_multiple_of(10) { agv.publish_connection("ONLINE") });
+    tolerance "online-behind-every-state" ["CONN-05", "CONN-10"] "It publishes ONLINE once more behind every state."
+        => when(Event::StateSent, |agv| agv.publish_connection("ONLINE"));
     tolerance "factsheet-again" ["FACT-01"] "Publishes its factsheet with every tenth state."
         => when(Event::StateSent, |agv| if agv.states_sent.is_multiple_of(10) { agv.publish_factsheet() });
     tolerance "first-state-late" ["CONN-05", "STATE-02"] "The first state of a connection comes more than a second after ONLINE."

@@ -21,6 +21,7 @@ mod actions;
 mod base;
 mod cancellation;
 mod curves;
+mod declining;
 mod dispatch;
 mod form;
 mod header;
@@ -78,6 +79,7 @@ const RECORDS: Records<dyn Deviation> = Records(&[
     maps::RECORDS,
     presence::RECORDS,
     reading::RECORDS,
+    declining::RECORDS,
 ]);
 
 /// Its faults and lapses.
