@@ -63,21 +63,20 @@ impl Running for IdRises {
             } => self.last.clear(),
             // The process goes on when the harness breaks its link, and so may its count.
             Event::Fault { .. } => self.before_cut.append(&mut self.last),
-            // Another process counts anew, whatever became of the link before.
-            Event::Program {
-                program: Program::Ended { .. },
-            } => {
-                self.last.clear();
-                self.before_cut.clear();
-            }
             // What makes a master control act does not restart it.
             Event::Hook { hook, .. }
                 if context.role == Role::MasterControl && !context.hook(hook).is_some_and(HookInfo::may_restart) => {}
             // Its farewell belongs to the count, and at the tap nothing is lost on the way.
             Event::Hook { hook, .. }
                 if record.link.tap && context.hook(hook).is_some_and(|hook| hook.has(HookEffect::ShutsDown)) => {}
-            // Messages may be lost on the way while the harness plays with the link or somebody with the device.
-            Event::Hook { .. } | Event::Answer { .. } | Event::Undecodable { .. } => {
+            // Messages may be lost on the way while the harness plays with the link or somebody with the device, and another
+            // process counts anew.
+            Event::Program {
+                program: Program::Ended { .. },
+            }
+            | Event::Hook { .. }
+            | Event::Answer { .. }
+            | Event::Undecodable { .. } => {
                 self.last.clear();
                 self.before_cut.clear();
             }

@@ -34,10 +34,10 @@ impl Awaits {
 /// Whether that the hook of a step is declined leaves open what a test decides: something is awaited of a master control behind it,
 /// be it that nothing comes. In a conversation it ends what was asked for.
 pub(super) fn is_an_answer(step: &Step, test: &Test, pack: &Pack) -> bool {
-    let behind = test.steps.iter().skip_while(|other| other.path != step.path).skip(1);
+    let mut behind = test.steps.iter().skip_while(|other| other.path != step.path).skip(1);
     test.device == Role::MasterControl
         && test.goes_on_at(&step.path).is_none()
-        && behind.filter_map(|step| Awaits::of(step, pack)).next().is_some()
+        && behind.find_map(|step| Awaits::of(step, pack)).is_some()
 }
 
 /// What was declined, and why.
