@@ -125,6 +125,11 @@ pub(super) struct Continuity {
     command: Option<(Moment, Moment, BTreeSet<u64>)>,
     /// Until the state behind the first one shows that nothing was under way.
     early: Option<Early>,
+    /// The last state names an order.
+    has_order: bool,
+    /// When a state named no order any more, since the last message on `connection`: the sign of a start that was not seen,
+    /// where messages are missing.
+    reset: Option<Moment>,
     /// How many holes there are.
     pub holes: u64,
 }
@@ -136,15 +141,33 @@ impl Continuity {
         if name == "connection" {
             // The count may begin anew on every topic of the vehicle.
             self.last
-                .retain(|topic, _| matches!(topic.as_str(), "order" | "instantActions"));
+                .retain(|topic, _| matches!(topic.as_str(), "order" | "instantActions" | "connection"));
             self.shown = None;
-            self.last.insert(name.to_owned(), (id, now));
-            return self.early.take().map_or(Step::Begins, |early| {
-                Step::Hole(Hole {
-                    since: early.since,
+            let before = self.last.insert(name.to_owned(), (id, now)).and_then(|(id, _)| id);
+            // A number that was left out may be the farewell, or the start, by which an order was forgotten.
+            let is_skipped = before.zip(id).is_some_and(|(before, id)| id > next(before));
+            let reset = self.reset.take().filter(|_| is_skipped);
+            let early = self.early.take().map(|early| early.since);
+            self.holes += u64::from(is_skipped);
+            self.has_order = false;
+            return match (reset, early) {
+                (None, None) => Step::Begins,
+                (None, Some(since)) => Step::Hole(Hole {
+                    since,
                     missing: Missing::Commands,
-                })
-            });
+                }),
+                (Some(reset), early) => Step::Hole(Hole {
+                    since: early.map_or(reset, |early| early.min(reset)),
+                    missing: Missing::Anything,
+                }),
+            };
+        }
+        if let Some(state) = message.and_then(MessageView::state) {
+            let has_order = !state.order_id.or_empty().is_empty();
+            if self.has_order && !has_order {
+                self.reset.get_or_insert(now);
+            }
+            self.has_order = has_order;
         }
         let before = self.last.insert(name.to_owned(), (id, now));
         let starts_are_seen = self.last.contains_key("connection");
@@ -244,6 +267,12 @@ impl Continuity {
             errors: state.errors.iter().map(|error| error.print).collect(),
             orders: BTreeSet::new(),
         });
+    }
+
+    /// Since when the vehicle may have been started anew without a message that says so: it forgot its order, and messages are
+    /// missing.
+    pub fn restarted_unseen(&self) -> Option<Moment> {
+        self.reset.filter(|_| self.holes > 0)
     }
 
     /// Whether what was sent before the first state may still be under way.
@@ -371,7 +400,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_a_fall_and_a_repeat_are_holes() {
+    fn a_gap_and_a_fall_are_holes_and_a_repeat_is_none() {
         let found = steps(&[1, 2, 4, 5, 5, 3].map(|id| ("state", json!({ "headerId": id }))));
         let hole = |at, missing| {
             Step::Hole(Hole {
@@ -382,7 +411,7 @@ mod tests {
         let late = |at| hole(at, Missing::States);
         assert_eq!(
             found,
-            [Step::Begins, Step::Follows, late(1), Step::Follows, late(3), late(4)]
+            [Step::Begins, Step::Follows, late(1), Step::Follows, Step::Follows, late(4)]
         );
         // A vehicle that was started anew unseen may be another one.
         let anew = steps(&[

@@ -91,6 +91,12 @@ impl Conversation {
                     _ => {}
                 }
             }
+            // Nothing that was told is taken back.
+            if let Some(since) = self.continuity.restarted_unseen().filter(|since| scene.live && *since == moment) {
+                for side in &mut self.sides {
+                    side.broken(since, Missing::Anything, Apart::Missing);
+                }
+            }
             // What was sent of an order before is not known: judging begins where none is under way.
             let is_first = step == Step::Begins && !self.began && self.continuity.holes == 0;
             let may_begin = step == Step::Follows || is_first;
@@ -138,10 +144,15 @@ impl Conversation {
     pub fn conclude(&mut self, scene: AuditContext<'_>) -> Concluded {
         let Self {
             pack,
-            sides,
+            mut sides,
             continuity,
             ..
         } = std::mem::take(self);
+        if let Some(since) = continuity.restarted_unseen() {
+            for side in &mut sides {
+                side.broken(since, Missing::Anything, Apart::Missing);
+            }
+        }
         let sides = sides.into_iter().filter(|side| side.messages > 0);
         Concluded {
             protocol: pack.map(|pack| pack.version.to_string()),
