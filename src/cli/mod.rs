@@ -15,6 +15,7 @@ mod explore;
 mod export;
 mod follow;
 mod gate;
+mod impaired;
 mod language;
 mod list;
 mod log;

@@ -54,6 +54,10 @@ fn site(arguments: &SimulatedSite) -> Result<Exit, Problem> {
         messages: arguments.messages,
         faults: arguments.faults,
     };
+    if arguments.measure {
+        super::print(&super::impaired::table(site)?)?;
+        return Ok(Exit::Conforms);
+    }
     let mut out = std::io::BufWriter::new(std::io::stdout().lock());
     let mut key = match &arguments.key {
         Some(path) => Some(std::io::BufWriter::new(std::fs::File::create(path).map_err(broken)?)),

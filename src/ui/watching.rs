@@ -91,6 +91,7 @@ impl<W: Write, E: Write> Viewer for Lines<W, E> {
                 Happening::Connected => ("connected", Value::Null),
                 Happening::Again(unseen) => ("connected", json!({ "unseenSeconds": unseen.as_secs_f64() })),
                 Happening::Lost(why) => ("lost", json!(why)),
+                Happening::NotRecorded(why) => ("not-recorded", json!(why)),
             };
             self.write(&json!({ "kind": kind, "at": format!("{at:.3}"), "detail": more }).to_string());
         }
@@ -103,6 +104,10 @@ impl<W: Write, E: Write> Viewer for Lines<W, E> {
                 unseen.as_secs_f64()
             ),
             Happening::Lost(why) => format!("{at:.3} the connection is lost, and tried again: {}", line(why)),
+            Happening::NotRecorded(why) => format!(
+                "{at:.3} nothing is recorded any more, and what is heard is judged as before: {}",
+                line(why)
+            ),
         };
         let _ = self.notes.line(&text);
     }

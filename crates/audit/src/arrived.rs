@@ -25,13 +25,13 @@ impl Arrived {
 }
 
 /// The record as the side that is judged is shown it: its own messages came, those of the other side were sent.
-pub(super) fn of_side(arrived: &Arrived, own: bool, apart: i64) -> Arc<Entry> {
+pub(super) fn as_shown(arrived: &Arrived, own: bool, apart: i64, retain: bool) -> Arc<Entry> {
     let Event::Message {
         topic,
         qos,
-        retain,
         dup,
         payload,
+        ..
     } = arrived.entry.event().clone()
     else {
         return Arc::clone(&arrived.entry);

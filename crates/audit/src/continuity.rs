@@ -16,6 +16,9 @@ const SENT: usize = 8192;
 /// How far recorders change the order of messages of different topics.
 const CROSSING: Duration = Duration::from_millis(100);
 
+/// By how much a count may fall because a message is late. A vehicle that was started anew begins with its first numbers.
+const LATE: u64 = 8;
+
 /// What a message is for those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Step {
@@ -23,8 +26,52 @@ pub(super) enum Step {
     Follows,
     /// There was none before that it could follow.
     Begins,
-    /// Something is missing since that moment.
-    Hole(Moment),
+    /// Something is missing.
+    Hole(Hole),
+}
+
+/// Where something is missing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Hole {
+    /// Since when.
+    pub since: Moment,
+    /// What.
+    pub missing: Missing,
+}
+
+/// What is not known behind a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Missing {
+    /// What the vehicle showed meanwhile. It was the same vehicle all the time.
+    States,
+    /// What was sent to it.
+    Commands,
+    /// Where it was between its states.
+    Visualization,
+    /// Whether the factsheet still holds.
+    Factsheet,
+    /// Nothing, but who knew what of the other one's messages.
+    Knowledge,
+    /// Whatever may have been, a restart included.
+    Anything,
+}
+
+impl Missing {
+    /// What a gap in the count of a topic hides.
+    fn of_topic(name: &str) -> Self {
+        match name {
+            "state" => Self::States,
+            "order" | "instantActions" => Self::Commands,
+            "visualization" => Self::Visualization,
+            "factsheet" => Self::Factsheet,
+            _ => Self::Anything,
+        }
+    }
+
+    /// Whether orders and actions that were seen before say nothing about what comes.
+    const fn is_of_conversation(self) -> bool {
+        matches!(self, Self::States | Self::Commands | Self::Anything)
+    }
 }
 
 /// Texts that are known, by their print, bounded.
@@ -78,6 +125,11 @@ pub(super) struct Continuity {
     command: Option<(Moment, Moment, BTreeSet<u64>)>,
     /// Until the state behind the first one shows that nothing was under way.
     early: Option<Early>,
+    /// The last state names an order.
+    has_order: bool,
+    /// When a state named no order any more, since the last message on `connection`: the sign of a start that was not seen,
+    /// where messages are missing.
+    reset: Option<Moment>,
     /// How many holes there are.
     pub holes: u64,
 }
@@ -89,10 +141,33 @@ impl Continuity {
         if name == "connection" {
             // The count may begin anew on every topic of the vehicle.
             self.last
-                .retain(|topic, _| matches!(topic.as_str(), "order" | "instantActions"));
+                .retain(|topic, _| matches!(topic.as_str(), "order" | "instantActions" | "connection"));
             self.shown = None;
-            self.last.insert(name.to_owned(), (id, now));
-            return self.early.take().map_or(Step::Begins, |early| Step::Hole(early.since));
+            let before = self.last.insert(name.to_owned(), (id, now)).and_then(|(id, _)| id);
+            // A number that was left out may be the farewell, or the start, by which an order was forgotten.
+            let is_skipped = before.zip(id).is_some_and(|(before, id)| id > next(before));
+            let reset = self.reset.take().filter(|_| is_skipped);
+            let early = self.early.take().map(|early| early.since);
+            self.holes += u64::from(is_skipped);
+            self.has_order = false;
+            return match (reset, early) {
+                (None, None) => Step::Begins,
+                (None, Some(since)) => Step::Hole(Hole {
+                    since,
+                    missing: Missing::Commands,
+                }),
+                (Some(reset), early) => Step::Hole(Hole {
+                    since: early.map_or(reset, |early| early.min(reset)),
+                    missing: Missing::Anything,
+                }),
+            };
+        }
+        if let Some(state) = message.and_then(MessageView::state) {
+            let has_order = !state.order_id.or_empty().is_empty();
+            if self.has_order && !has_order {
+                self.reset.get_or_insert(now);
+            }
+            self.has_order = has_order;
         }
         let before = self.last.insert(name.to_owned(), (id, now));
         let starts_are_seen = self.last.contains_key("connection");
@@ -101,13 +176,24 @@ impl Continuity {
             Some((Some(before), _)) if id == Some(next(before)) => Step::Follows,
             // A count that stands still hides nothing, unless its first number may be that of another start.
             Some((Some(before), _)) if id == Some(before) && (before > 1 || starts_are_seen) => Step::Follows,
-            Some((_, since)) => Step::Hole(since),
+            Some((last, since)) => {
+                let is_late = |last: u64, id: u64| id > last || (id > 1 && last - id <= LATE);
+                let goes_on = last.zip(id).is_some_and(|(last, id)| is_late(last, id));
+                let is_command = matches!(name, "order" | "instantActions");
+                let missing = if goes_on || is_command {
+                    Missing::of_topic(name)
+                } else {
+                    Missing::Anything
+                };
+                Step::Hole(Hole { since, missing })
+            }
         };
         let step = match (counted, message) {
-            (Step::Hole(since), _) => Step::Hole(since),
-            (step, Some(MessageView::State(state))) if !self.explained(state) => {
-                Step::Hole(before.map_or(now, |(_, since)| since)).max_of(step)
-            }
+            (Step::Hole(hole), _) => Step::Hole(hole),
+            (_, Some(MessageView::State(state))) if !self.explained(state) => Step::Hole(Hole {
+                since: before.map_or(now, |(_, since)| since),
+                missing: Missing::Commands,
+            }),
             (step, _) => step,
         };
         if let Step::Hole(_) = step {
@@ -115,13 +201,26 @@ impl Continuity {
         }
         let early = self.early.as_ref().map(|early| early.since);
         let step = match (step, early) {
-            (Step::Hole(since), Some(early)) => Step::Hole(since.min(early)),
+            (Step::Hole(hole), Some(early)) if hole.missing.is_of_conversation() => Step::Hole(Hole {
+                since: hole.since.min(early),
+                missing: if hole.missing == Missing::Commands {
+                    Missing::Commands
+                } else {
+                    Missing::Anything
+                },
+            }),
             (step, Some(early)) if message.is_some_and(|message| self.was_under_way(message)) => {
-                Step::Hole(early).max_of(step)
+                let missing = match step {
+                    Step::Hole(_) => Missing::Anything,
+                    _ => Missing::Commands,
+                };
+                Step::Hole(Hole { since: early, missing })
             }
             (step, _) => step,
         };
-        if let Step::Hole(_) = step {
+        if let Step::Hole(hole) = step
+            && hole.missing.is_of_conversation()
+        {
             self.forget();
         }
         self.learn(message);
@@ -168,6 +267,12 @@ impl Continuity {
             errors: state.errors.iter().map(|error| error.print).collect(),
             orders: BTreeSet::new(),
         });
+    }
+
+    /// Since when the vehicle may have been started anew without a message that says so: it forgot its order, and messages are
+    /// missing.
+    pub fn restarted_unseen(&self) -> Option<Moment> {
+        self.reset.filter(|_| self.holes > 0)
     }
 
     /// Whether what was sent before the first state may still be under way.
@@ -230,16 +335,6 @@ impl Continuity {
     fn actions<'m>(&mut self, actions: impl Iterator<Item = &'m ActionView>) {
         for id in actions.filter_map(|action| action.action_id.text()) {
             self.sent.add(id);
-        }
-    }
-}
-
-impl Step {
-    /// A hole is a hole whatever the count says.
-    fn max_of(self, other: Self) -> Self {
-        match self {
-            Self::Hole(_) => self,
-            _ => other,
         }
     }
 }
@@ -307,18 +402,29 @@ mod tests {
     #[test]
     fn a_gap_and_a_fall_are_holes_and_a_repeat_is_none() {
         let found = steps(&[1, 2, 4, 5, 5, 3].map(|id| ("state", json!({ "headerId": id }))));
-        let hole = |at| Step::Hole(Moment::from_micros(at));
+        let hole = |at, missing| {
+            Step::Hole(Hole {
+                since: Moment::from_micros(at),
+                missing,
+            })
+        };
+        let late = |at| hole(at, Missing::States);
         assert_eq!(
             found,
-            [
-                Step::Begins,
-                Step::Follows,
-                hole(1),
-                Step::Follows,
-                Step::Follows,
-                hole(4)
-            ]
+            [Step::Begins, Step::Follows, late(1), Step::Follows, Step::Follows, late(4)]
         );
+        // A vehicle that was started anew unseen may be another one.
+        let anew = steps(&[
+            ("state", json!({ "headerId": 40 })),
+            ("state", json!({ "headerId": 1 })),
+        ]);
+        assert_eq!(anew[1], hole(0, Missing::Anything));
+        // Where it was between its states does not matter to what was sent.
+        let beside = steps(&[
+            ("visualization", json!({ "headerId": 1 })),
+            ("visualization", json!({ "headerId": 9 })),
+        ]);
+        assert_eq!(beside[1], hole(0, Missing::Visualization));
         let wraps = [u64::from(u32::MAX), 0].map(|id| ("state", json!({ "headerId": id })));
         assert_eq!(steps(&wraps)[1], Step::Follows);
     }
@@ -329,7 +435,11 @@ mod tests {
         let order = ("order", json!({ "headerId": 1, "orderId": "b", "orderUpdateId": 0 }));
         let found = steps(&[state(1, "a"), order, state(2, "b"), state(3, "c"), state(4, "c")]);
         assert_eq!(found[2], Step::Follows);
-        assert_eq!(found[3], Step::Hole(Moment::from_micros(2)));
+        let hole = Hole {
+            since: Moment::from_micros(2),
+            missing: Missing::Commands,
+        };
+        assert_eq!(found[3], Step::Hole(hole));
         assert_eq!(found[4], Step::Follows);
     }
 

@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::AuditContext;
-use super::arrived::{Arrived, is_at_rest, of_side, timestamp};
-use super::continuity::{Continuity, Step};
+use super::arrived::{Arrived, is_at_rest, timestamp};
+use super::continuity::{Continuity, Missing, Step};
 use super::result::SideResult;
 use super::side::{Apart, Side};
+use super::span::Span;
 use tck_base::clock::Moment;
 use tck_pack::{Pack, Role};
 use tck_view::MessageView;
@@ -52,10 +53,11 @@ impl Conversation {
     }
 
     /// Nothing was seen for a while.
-    pub fn interrupted(&mut self, since: Moment) {
+    pub fn interrupted(&mut self, since: Moment, scene: AuditContext<'_>) {
         self.continuity.interrupted();
         for side in &mut self.sides {
-            side.broken(since, Apart::Missing);
+            side.broken(since, Missing::Anything, Apart::Missing);
+            side.mended(scene, |span| span == Span::Factsheet);
         }
     }
 
@@ -74,19 +76,25 @@ impl Conversation {
             let moment = arrived.at.moment;
             if let Some(since) = self.continuity.crossed(message, moment) {
                 let commanding = self.sides.iter_mut().filter(|side| side.role == Role::MasterControl);
-                commanding.for_each(|side| side.broken(since, Apart::Crossed));
+                commanding.for_each(|side| side.broken(since, Missing::Knowledge, Apart::Crossed));
             }
             let step = self.continuity.note(&arrived.name, message, moment);
             let begins_anew = arrived.name == "connection";
             for side in &mut self.sides {
                 match step {
-                    Step::Hole(since) => side.broken(since, Apart::Missing),
+                    Step::Hole(hole) => side.broken(hole.since, hole.missing, Apart::Missing),
                     // Nobody knows what becomes of a vehicle while it is away.
                     Step::Begins if begins_anew && side.role == Role::MasterControl => {
-                        side.broken(arrived.at.moment, Apart::Connection);
+                        side.broken(arrived.at.moment, Missing::Knowledge, Apart::Connection);
                     }
                     Step::Follows if arrived.name == "state" => side.confirmed(scene),
                     _ => {}
+                }
+            }
+            // Nothing that was told is taken back.
+            if let Some(since) = self.continuity.restarted_unseen().filter(|since| scene.live && *since == moment) {
+                for side in &mut self.sides {
+                    side.broken(since, Missing::Anything, Apart::Missing);
                 }
             }
             // What was sent of an order before is not known: judging begins where none is under way.
@@ -94,17 +102,21 @@ impl Conversation {
             let may_begin = step == Step::Follows || is_first;
             let state = message.and_then(MessageView::state);
             let state = state.filter(|state| may_begin && is_at_rest(state));
-            if let Some(state) = state.filter(|_| self.sides.iter().any(|side| !side.watches())) {
+            if let Some(state) = state.filter(|_| self.sides.iter().any(|side| !side.is_complete())) {
                 self.began = true;
                 self.continuity.forget();
                 self.continuity.learn(message);
                 if is_first {
                     self.continuity.begins_early(state, moment);
                 }
+                // What one side has forgotten the other one cannot be held to.
                 for side in &mut self.sides {
-                    side.broken(Moment::from_micros(u64::MAX), Apart::Missing);
-                    side.mended(scene);
+                    side.end(Span::begins_at_rest);
+                    side.mended(scene, Span::begins_at_rest);
                 }
+            }
+            for side in &mut self.sides {
+                side.mended(scene, |span| span == Span::Factsheet);
             }
         }
         // How far the clocks are apart is not known to be the mistake of the device.
@@ -117,12 +129,8 @@ impl Conversation {
         for side in &mut self.sides {
             let own = side.role == publisher;
             side.messages += u64::from(own);
-            if arrived.stale && !own {
-                continue;
-            }
             let apart = self.clocks.get(word).copied().unwrap_or_default();
-            let entry = of_side(arrived, own, apart);
-            side.observe(&entry, arrived.at.utc, scene);
+            side.observe(arrived, own, apart, scene);
             if own {
                 side.note(arrived, scene);
             }
@@ -136,10 +144,15 @@ impl Conversation {
     pub fn conclude(&mut self, scene: AuditContext<'_>) -> Concluded {
         let Self {
             pack,
-            sides,
+            mut sides,
             continuity,
             ..
         } = std::mem::take(self);
+        if let Some(since) = continuity.restarted_unseen() {
+            for side in &mut sides {
+                side.broken(since, Missing::Anything, Apart::Missing);
+            }
+        }
         let sides = sides.into_iter().filter(|side| side.messages > 0);
         Concluded {
             protocol: pack.map(|pack| pack.version.to_string()),

@@ -29,6 +29,7 @@ pub mod result;
 pub mod saved;
 mod side;
 pub mod slice;
+mod span;
 pub mod time_line;
 mod topics;
 mod vehicle;
@@ -406,6 +407,8 @@ impl<'r> Audit<'r> {
     }
 }
 
+#[cfg(test)]
+mod hole_tests;
 #[cfg(test)]
 mod mqtt_sessions_tests;
 #[cfg(test)]

@@ -310,6 +310,9 @@ pub struct Undecided {
     pub monitor: String,
     /// Why.
     pub why: String,
+    /// The messages for which that holds, where it does not hold for all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stretch: Option<Stretch>,
 }
 
 impl SideResult {

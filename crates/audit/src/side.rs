@@ -3,10 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
-use super::arrived::Arrived;
+use super::arrived::{Arrived, as_shown};
+use super::continuity::Missing;
 use super::new_findings::Found;
 use super::outcome::Outcome;
 use super::result::{FindingResult, SideResult, Stretch, Undecided, Whereabouts};
+use super::span::{self, Span};
 use super::{AuditContext, finding_group};
 use tck_base::clock::{Moment, Stamp};
 use tck_base::verdict::Verdict;
@@ -20,6 +22,8 @@ use tck_suite::model::{Monitor, Recordings};
 
 /// How many findings wait for their confirmation.
 const OPEN: usize = 256;
+/// How many findings can still be taken back.
+const REVOCABLE: usize = 256;
 /// How many messages of a side are kept to be shown, and how many characters of each.
 const SHOWN: usize = 32;
 const LENGTH: usize = 4_000;
@@ -70,6 +74,32 @@ impl Apart {
     }
 }
 
+/// Monitors that need the same to be unbroken.
+struct Duty {
+    span: Span,
+    /// Nothing before it can begin, and behind a hole.
+    judge: Option<TrafficJudge>,
+}
+
+/// A finding that holds only if nothing turns out to be missing.
+struct Open {
+    span: Span,
+    at: Moment,
+    observed: Observed,
+    utc: jiff::Timestamp,
+    entry: Arc<Entry>,
+}
+
+/// A finding that was counted.
+struct Revocable {
+    span: Span,
+    at: Moment,
+    key: Key,
+    count: u64,
+    /// When the one before it was made.
+    before: String,
+}
+
 /// One side of a vehicle's traffic: what the vehicle says, or what is said to it.
 pub(super) struct Side {
     pub role: Role,
@@ -78,11 +108,17 @@ pub(super) struct Side {
     timed: bool,
     begun: Stamp,
     each: TrafficJudge,
-    /// Those that need an unbroken record, from where it is one.
-    unbroken: Option<TrafficJudge>,
+    /// Those that need an unbroken record of something, from where it is one.
+    duties: Vec<Duty>,
+    /// The factsheet that counts, as this side is shown it.
+    sheet: Option<Arc<Entry>>,
+    /// Whether there was one.
+    had_sheet: bool,
     kept: BTreeMap<Key, FindingResult>,
-    /// What holds only if nothing turns out to be missing: since when, and what.
-    open: VecDeque<(Moment, Observed, jiff::Timestamp, Arc<Entry>)>,
+    /// What holds only if nothing turns out to be missing.
+    open: VecDeque<Open>,
+    /// What was found last: what turns out to be missing later may explain it.
+    revocable: VecDeque<Revocable>,
     /// How many messages are kept to be shown.
     shown: usize,
     judged: BTreeMap<String, u64>,
@@ -106,15 +142,25 @@ impl Side {
     pub fn begin(role: Role, header: RunHeader, begun: Stamp, timed: bool, scene: AuditContext<'_>) -> Option<Self> {
         let mut each = start(&header, scene, &judges_each_message)?;
         each.observe(&first(&header, begun));
-        Some(Self {
+        let has = |span: Span| {
+            let mut monitors = of_side(scene, role, &header);
+            span == Span::Conversation
+                || monitors.any(|monitor| Span::of(monitor, role, timed, scene.rules) == Some(span))
+        };
+        let duties = Span::ALL.into_iter().filter(|span| has(*span));
+        let duties: Vec<Duty> = duties.map(|span| Duty { span, judge: None }).collect();
+        let mut side = Self {
             role,
             header,
             timed,
             begun,
             each,
-            unbroken: None,
+            duties,
+            sheet: None,
+            had_sheet: false,
             kept: BTreeMap::new(),
             open: VecDeque::new(),
+            revocable: VecDeque::new(),
             shown: 0,
             judged: BTreeMap::new(),
             decided: BTreeSet::new(),
@@ -126,21 +172,67 @@ impl Side {
             stretches: Vec::new(),
             in_stretch: false,
             news: Vec::new(),
-        })
+        };
+        side.mended(scene, |span| span == Span::Factsheet);
+        Some(side)
     }
 
-    /// Whether the monitors that need an unbroken record are on duty.
+    /// Whether the monitors that hold messages of both sides against each other are on duty.
     pub fn watches(&self) -> bool {
-        self.unbroken.is_some()
+        let mut duties = self.duties.iter();
+        duties.any(|duty| duty.span == Span::Conversation && duty.judge.is_some())
     }
 
-    /// Nothing is known since then, for this reason.
-    pub fn broken(&mut self, since: Moment, why: Apart) {
-        self.open.retain(|(at, ..)| *at < since);
-        if let Some(judge) = self.unbroken.take() {
+    /// Whether all are on duty that begin where nothing is under way.
+    pub fn is_complete(&self) -> bool {
+        let mut duties = self.duties.iter().filter(|duty| duty.span.begins_at_rest());
+        duties.all(|duty| duty.judge.is_some())
+    }
+
+    /// Something is not known since then, for this reason.
+    pub fn broken(&mut self, since: Moment, missing: Missing, why: Apart) {
+        self.open
+            .retain(|open| open.at < since || !open.span.is_touched(missing));
+        self.take_back(since, missing);
+        if matches!(missing, Missing::Factsheet | Missing::Anything) {
+            self.sheet = None;
+        }
+        if self.watches() && Span::Conversation.is_touched(missing) {
             self.apart = why;
+        }
+        self.end(|span| span.is_touched(missing));
+    }
+
+    /// Ends what the monitors of these spans remember.
+    pub fn end(&mut self, wanted: impl Fn(Span) -> bool) {
+        let duties = self.duties.iter_mut().filter(|duty| wanted(duty.span));
+        let ended: Vec<TrafficJudge> = duties.filter_map(|duty| duty.judge.take()).collect();
+        for judge in ended {
             self.absorb(&judge);
         }
+    }
+
+    /// Takes back what was found since then and what is missing may explain.
+    fn take_back(&mut self, since: Moment, missing: Missing) {
+        let mut kept = VecDeque::new();
+        while let Some(last) = self.revocable.pop_back() {
+            if last.at < since {
+                kept.push_front(last);
+                break;
+            }
+            if !last.span.is_touched(missing) {
+                kept.push_front(last);
+                continue;
+            }
+            if let Some(known) = self.kept.get_mut(&last.key) {
+                known.count = known.count.saturating_sub(last.count);
+                known.last = last.before;
+                if known.count == 0 {
+                    self.kept.remove(&last.key);
+                }
+            }
+        }
+        self.revocable.append(&mut kept);
     }
 
     /// Counts a message of this side, and whether it is held against those before it.
@@ -183,46 +275,109 @@ impl Side {
         }
     }
 
-    /// From here on nothing is missing, as far as can be told.
-    pub fn mended(&mut self, scene: AuditContext<'_>) {
-        if self.unbroken.is_some() {
-            return;
-        }
-        let timed = self.timed;
-        let wanted = move |monitor: &Monitor| match monitor.recordings {
-            Recordings::Unbroken => true,
-            Recordings::UnbrokenInTime => timed,
-            _ => false,
-        };
-        self.unbroken = start(&self.header, scene, &wanted).map(|mut judge| {
+    /// From here on nothing is missing of these spans, as far as can be told.
+    pub fn mended(&mut self, scene: AuditContext<'_>, wanted: impl Fn(Span) -> bool) {
+        let (role, timed) = (self.role, self.timed);
+        for duty in &mut self.duties {
+            if duty.judge.is_some() || !wanted(duty.span) {
+                continue;
+            }
+            let span = Some(duty.span);
+            let used = |monitor: &Monitor| Span::of(monitor, role, timed, scene.rules) == span;
+            let Some(mut judge) = start(&self.header, scene, &used) else {
+                continue;
+            };
             judge.observe(&first(&self.header, self.begun));
-            judge
-        });
+            // What it finds in a message from before was found before.
+            let is_counted = role == Role::Agv && duty.span == Span::Factsheet;
+            if let Some(sheet) = self.sheet.as_ref().filter(|_| !is_counted) {
+                judge.observe(sheet);
+            }
+            duty.judge = Some(judge);
+        }
     }
 
     /// Nothing was missing up to here.
     pub fn confirmed(&mut self, scene: AuditContext<'_>) {
-        while let Some((_, observed, utc, entry)) = self.open.pop_front() {
-            self.keep(observed, utc, Some(&entry), scene);
+        while let Some(open) = self.open.pop_front() {
+            self.count(open, scene);
         }
     }
 
-    /// Shows it a message.
-    pub fn observe(&mut self, entry: &Arc<Entry>, utc: jiff::Timestamp, scene: AuditContext<'_>) {
-        for observed in self.each.observe(entry) {
-            self.keep(observed, utc, Some(entry), scene);
+    /// Counts a finding that can still be taken back.
+    fn count(&mut self, open: Open, scene: AuditContext<'_>) {
+        let Open {
+            span,
+            at,
+            observed,
+            utc,
+            entry,
+        } = open;
+        let key = self.key(&observed.monitor, &observed.finding);
+        let count = observed.finding.count;
+        let before = self.kept.get(&key).map(|known| known.last.clone()).unwrap_or_default();
+        self.keep(observed, utc, Some(&entry), scene);
+        if self.revocable.len() == REVOCABLE {
+            self.revocable.pop_front();
         }
-        let found = self
-            .unbroken
-            .as_mut()
-            .map(|judge| judge.observe(entry))
-            .unwrap_or_default();
-        for observed in found {
+        self.revocable.push_back(Revocable {
+            span,
+            at,
+            key,
+            count,
+            before,
+        });
+    }
+
+    /// Shows it a message, whose clock is that far from the recorder's.
+    pub fn observe(&mut self, arrived: &Arrived, own: bool, apart: i64, scene: AuditContext<'_>) {
+        let is_sheet = arrived.name == "factsheet";
+        if arrived.stale && !own && !is_sheet {
+            return;
+        }
+        let entry = as_shown(arrived, own, apart, arrived.stale);
+        for observed in self.each.observe(&entry) {
+            self.keep(observed, arrived.at.utc, Some(&entry), scene);
+        }
+        // A factsheet that was stored counts like one that comes, and is no evidence.
+        let live = if is_sheet && arrived.stale {
+            as_shown(arrived, own, apart, false)
+        } else {
+            entry
+        };
+        if is_sheet {
+            self.sheet = Some(Arc::clone(&live));
+            self.had_sheet = true;
+        }
+        let mut found = Vec::new();
+        for duty in &mut self.duties {
+            let is_counted = own && is_sheet && arrived.stale && duty.span == Span::Factsheet;
+            let Some(judge) = duty
+                .judge
+                .as_mut()
+                .filter(|_| duty.span.hears(&arrived.name) && !is_counted)
+            else {
+                continue;
+            };
+            let observed = judge.observe(&live).into_iter().map(|observed| (duty.span, observed));
+            found.extend(observed.filter(|_| !(is_sheet && arrived.stale)));
+        }
+        for (span, observed) in found {
+            let open = Open {
+                span,
+                at: live.at().moment,
+                observed,
+                utc: arrived.at.utc,
+                entry: Arc::clone(&live),
+            };
+            if !span.waits() {
+                self.count(open, scene);
+                continue;
+            }
             if self.open.len() == OPEN {
                 self.open.pop_front();
             }
-            self.open
-                .push_back((entry.at().moment, observed, utc, Arc::clone(entry)));
+            self.open.push_back(open);
         }
     }
 
@@ -316,33 +471,65 @@ impl Side {
         self.decided.extend(judge.decided());
     }
 
+    /// Why a monitor judged nothing, and for which stretch that holds.
+    fn why_undecided(&self, monitor: &Monitor, scene: AuditContext<'_>) -> (String, Option<Stretch>) {
+        let is_without_sheet = !self.had_sheet && span::needs_factsheet(monitor, scene.rules);
+        let span = Span::of(monitor, self.role, self.timed, scene.rules);
+        let why = match &monitor.recordings {
+            Recordings::Never(why) => why,
+            Recordings::UnbrokenInTime if !self.timed => "the recording does not say when messages came",
+            Recordings::Packets => PACKETS,
+            _ if is_without_sheet => "no factsheet of the vehicle was recorded",
+            _ if self.not_compared > 0 && span.is_some_and(Span::begins_at_rest) => {
+                return match (self.compared, self.not_compared_stretch()) {
+                    (0, stretch) => (self.apart.why().to_owned(), stretch),
+                    (_, stretch) => (
+                        "nothing came that it could judge where messages were held against earlier ones".to_owned(),
+                        stretch,
+                    ),
+                };
+            }
+            _ => "nothing came that it could judge",
+        };
+        (why.to_owned(), None)
+    }
+
+    /// From the first message to the last one that was not held against those before it.
+    fn not_compared_stretch(&self) -> Option<Stretch> {
+        let (first, last) = (self.stretches.first()?, self.stretches.last()?);
+        Some(Stretch {
+            messages: self.not_compared,
+            from: first.from.clone(),
+            to: last.to.clone(),
+            why: first.why.clone(),
+        })
+    }
+
     /// What came out.
     pub fn finish(mut self, scene: AuditContext<'_>) -> SideResult {
         // What is found at the very end may be explained by what comes next.
         self.open.clear();
-        if let Some(judge) = self.unbroken.take() {
-            self.absorb(&judge);
+        let ended: Vec<TrafficJudge> = self.duties.iter_mut().filter_map(|duty| duty.judge.take()).collect();
+        for judge in &ended {
+            self.absorb(judge);
         }
         for (id, judged) in self.each.judged() {
             *self.judged.entry(id).or_default() += judged;
         }
         self.decided.extend(self.each.decided());
-        let findings = self.kept.into_values().collect();
         let mut undecided = Vec::new();
         for monitor in of_side(scene, self.role, &self.header) {
-            let id = monitor.id.clone();
-            let why = match &monitor.recordings {
-                Recordings::Never(why) => why,
-                Recordings::UnbrokenInTime if !self.timed => "the recording does not say when messages came",
-                Recordings::Packets if self.judged.get(&id).is_none_or(|judged| *judged == 0) => PACKETS,
-                _ if self.judged.get(&id).is_none_or(|judged| *judged == 0) => "nothing came that it could judge",
-                _ => continue,
-            };
+            if self.judged.get(&monitor.id).is_some_and(|judged| *judged > 0) && !is_never(monitor) {
+                continue;
+            }
+            let (why, stretch) = self.why_undecided(monitor, scene);
             undecided.push(Undecided {
-                monitor: id,
-                why: why.to_owned(),
+                monitor: monitor.id.clone(),
+                why,
+                stretch,
             });
         }
+        let findings = self.kept.into_values().collect();
         let judged = self.judged.values().filter(|judged| **judged > 0).count();
         // Who asks for certain monitors knows what he wants to see.
         let not_judged = (!self.spoke && scene.options.only.is_empty()).then_some(match self.role {
@@ -358,6 +545,11 @@ impl Side {
         }
         .unless(not_judged)
     }
+}
+
+/// Whether no recording can be judged by a monitor, whatever came.
+fn is_never(monitor: &Monitor) -> bool {
+    matches!(monitor.recordings, Recordings::Never(_))
 }
 
 /// Whether a monitor judges each message, whatever else is missing.

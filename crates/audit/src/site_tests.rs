@@ -6,7 +6,7 @@ use super::tests::spoiled;
 use super::*;
 use tck_base::verdict::Verdict;
 use tck_judge::Library;
-use tck_simulate::{Injected, Site, SiteMessage};
+use tck_simulate::{Impairment, Injected, Recorded, Site, SiteMessage};
 
 fn message(told: SiteMessage) -> Message {
     Message {
@@ -18,6 +18,13 @@ fn message(told: SiteMessage) -> Message {
         place: SourcePosition::default(),
         after_gap: false,
         carried: None,
+    }
+}
+
+fn recorded(one: Recorded) -> Message {
+    Message {
+        retain: Some(one.retain),
+        ..message(one.message)
     }
 }
 
@@ -116,6 +123,29 @@ fn accuses_nobody_however_bad_the_recording(seed: u64, vehicles: usize, messages
 fn a_faultless_fleet_is_accused_of_nothing_however_bad_the_recording() {
     for seed in 0..3 {
         accuses_nobody_however_bad_the_recording(seed, 12, 3_000);
+    }
+}
+
+#[test]
+fn a_faultless_fleet_is_accused_of_nothing_whatever_became_of_the_recording() {
+    let library = tck_testing::library();
+    for seed in 0..3 {
+        let site = Site {
+            seed,
+            vehicles: 12,
+            messages: 3_000,
+            faults: 0,
+        };
+        let told: Vec<SiteMessage> = site.messages().collect();
+        for impairment in Impairment::ALL {
+            let found = found(library, impairment.of(&told, seed).into_iter().map(recorded));
+            assert!(
+                found.is_empty(),
+                "{}: {:#?}",
+                impairment.name(),
+                &found[..found.len().min(20)]
+            );
+        }
     }
 }
 

@@ -208,7 +208,7 @@ impl Vehicle {
             self.pass(arrived, scene);
         }
         self.sorted.clear();
-        self.conversation.interrupted(self.now);
+        self.conversation.interrupted(self.now, scene);
     }
 
     /// What was found since this was asked last.

@@ -105,6 +105,7 @@ pub static REGISTRY: &[Check] = &[
     state::place::LAST_NODE_PLACE,
     state::values::IDLE_EMPTY,
     state::maps::MAPS,
+    state::maps::MAPS_STAY,
     state::map_changes::MAP_CHANGES,
     state::values::POSITION_RANGE,
     state::values::IDENTIFIERS,

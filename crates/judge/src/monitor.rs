@@ -128,7 +128,10 @@ impl MonitorJudge {
     /// From now on findings that say different things are kept apart, where each message is judged by itself: what is wrong with it
     /// is named at once. What one message shows beside others is one mistake, however it is said.
     pub(super) fn keep_apart(&mut self) {
-        self.apart = self.monitor.recordings == Recordings::Message;
+        self.apart = matches!(
+            self.monitor.recordings,
+            Recordings::Message | Recordings::MessageAndFactsheet
+        );
     }
 
     fn watch(rule: &Rule, ground: &Ground, bindings: &Bindings, known: &mut Knowledge) -> Result<Watching, Unbound> {

@@ -23,5 +23,5 @@ pub use hook_server::HookServer;
 pub use reference_agv::{ReferenceAgv, Vehicle};
 pub use reference_master_control::ReferenceMasterControl;
 pub use running_fleet::WithFleet;
-pub use site::{Injected, KINDS, Kind, Messages, Site, SiteMessage};
+pub use site::{Impairment, Injected, KINDS, Kind, Messages, Recorded, Site, SiteMessage};
 pub use unknown_name::UnknownName;

@@ -8,9 +8,10 @@ use tck_base::diagnostic::Diagnostic;
 type Meaning = fn() -> Recordings;
 
 /// The words that stand without a reason.
-const WORDS: [(&str, Meaning); 5] = [
+const WORDS: [(&str, Meaning); 6] = [
     ("message", || Recordings::Message),
     ("message-on-topic", || Recordings::MessageOnTopic),
+    ("message-and-factsheet", || Recordings::MessageAndFactsheet),
     ("unbroken", || Recordings::Unbroken),
     ("unbroken-in-time", || Recordings::UnbrokenInTime),
     ("packets", || Recordings::Packets),

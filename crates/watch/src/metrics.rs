@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::Watch;
 use super::vehicle_status::{BUCKETS, VehicleStatus};
+use tck_report::clean::line;
 
 /// The type of the text.
 pub(super) const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
@@ -45,7 +46,8 @@ fn escaped(text: &str) -> String {
             '\\' => safe.push_str("\\\\"),
             '"' => safe.push_str("\\\""),
             '\n' => safe.push_str("\\n"),
-            c => safe.push(c),
+            // What would take over a terminal is shown as what it is.
+            c => safe.push_str(&line(c.encode_utf8(&mut [0; 4]))),
         }
     }
     safe
@@ -192,6 +194,7 @@ mod tests {
         let mut page = Page(String::new());
         page.sample("a_total", &[("n", "x\"} 1\n\\"), ("m", "")], 2);
         page.sample("b", &[], 0.5);
+        assert_eq!(escaped("\u{1b}[2J\u{202e}"), "\u{241b}[2J\\u{202e}");
         assert_eq!(page.0, "a_total{n=\"x\\\"} 1\\n\\\\\",m=\"\"} 2\nb 0.5\n");
     }
 }

@@ -62,6 +62,8 @@ pub enum Happening {
     Again(Duration),
     /// Nothing is seen from now on.
     Lost(String),
+    /// Nothing is recorded from now on; what is heard is judged as before.
+    NotRecorded(String),
 }
 
 /// Who is shown what happens.
@@ -110,6 +112,7 @@ pub async fn run(
         let header = header(settings.listen.is_some());
         recorder = Some(Recorder::create(path, *rotation, header, clock.now())?);
     }
+    let mut recording = Recording { recorder };
     let mut server = None;
     if let Some(address) = &settings.metrics {
         let started = MetricsServer::start(address).await?;
@@ -166,9 +169,9 @@ pub async fn run(
                 if occurrence.direction == Some(Direction::ToDevice) && matches!(occurrence.event, Event::Packet { .. }) {
                     continue;
                 }
-                if let Some(recorder) = &mut recorder {
-                    recorder.record(occurrence.at, occurrence.source, occurrence.direction, occurrence.event.clone())?;
-                }
+                recording.write(viewer, occurrence.at.utc, |recorder| {
+                    recorder.record(occurrence.at, occurrence.source, occurrence.direction, occurrence.event.clone())
+                });
                 let (at, source) = (occurrence.at, occurrence.source);
                 let Some(wire) = from_journal::wire(at.utc, source, occurrence.direction, &occurrence.event, 0) else {
                     continue;
@@ -207,18 +210,14 @@ pub async fn run(
                         gone = Some(now.moment);
                         after_gap = true;
                         viewer.happened(&Happening::Lost(why.clone()), now.utc);
-                        if let Some(recorder) = &mut recorder {
-                            recorder.cut_off(now, &why)?;
-                        }
+                        recording.write(viewer, now.utc, |recorder| recorder.cut_off(now, &why));
                     }
                 }
                 ClientEvent::Message { topic, payload, qos, retain, dup } => {
                     let now = clock.now();
-                    if let Some(recorder) = &mut recorder {
-                        recorder.message(now, Event::Message {
-                            topic: topic.clone(), qos, retain, dup, payload: Payload::keep(payload.clone()),
-                        })?;
-                    }
+                    recording.write(viewer, now.utc, |recorder| recorder.message(now, Event::Message {
+                        topic: topic.clone(), qos, retain, dup, payload: Payload::keep(payload.clone()),
+                    }));
                     let message = Message {
                         at: Some(now.utc),
                         topic,
@@ -243,10 +242,29 @@ pub async fn run(
     if let Some(tap) = tap {
         tap.stop().await;
     }
-    if let Some(recorder) = recorder {
-        recorder.finish()?;
-    }
+    recording.write(viewer, clock.now().utc, |recorder| recorder.finish());
     Ok(watch.finish())
+}
+
+/// The journal that is written, as long as it can be.
+struct Recording {
+    recorder: Option<Recorder>,
+}
+
+impl Recording {
+    /// Writes something. A disk that is full ends the journal and not the watch, nor what goes through its tap.
+    fn write(
+        &mut self,
+        viewer: &mut impl Viewer,
+        at: jiff::Timestamp,
+        write: impl FnOnce(&mut Recorder) -> std::io::Result<()>,
+    ) {
+        let Some(Err(error)) = self.recorder.as_mut().map(write) else {
+            return;
+        };
+        self.recorder = None;
+        viewer.happened(&Happening::NotRecorded(error.to_string()), at);
+    }
 }
 
 /// Shows what was found; says whether something is violated.
@@ -289,5 +307,47 @@ fn header(tapped: bool) -> RunHeader {
         tool: tck_journal::tool(),
         vantage: if tapped { "tap" } else { "subscriber" }.to_owned(),
         ..RunHeader::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Default)]
+    struct Told(Vec<Happening>);
+
+    impl Viewer for Told {
+        fn found(&mut self, _: &Notice) {}
+        fn happened(&mut self, happening: &Happening, _: jiff::Timestamp) {
+            self.0.push(happening.clone());
+        }
+        fn alarmed(&mut self, _: &Alarmed) {}
+        fn tick(&mut self, _: &Watch<'_>, _: Contact) -> bool {
+            true
+        }
+    }
+
+    #[test]
+    fn a_full_disk_ends_the_journal_and_is_told_once() {
+        let folder = tempfile::tempdir().expect("folder");
+        let at = WallClock::start().now();
+        let recorder = Recorder::create(
+            &folder.path().join("site.jsonl"),
+            Rotation::default(),
+            header(false),
+            at,
+        );
+        let mut recording = Recording {
+            recorder: Some(recorder.expect("a journal")),
+        };
+        let mut told = Told::default();
+        recording.write(&mut told, at.utc, |recorder| recorder.cut_off(at, "reset"));
+        assert_eq!(told.0, []);
+        for _ in 0..2 {
+            recording.write(&mut told, at.utc, |_| Err(std::io::Error::other("no space left")));
+        }
+        assert_eq!(told.0, [Happening::NotRecorded("no space left".to_owned())]);
+        recording.write(&mut told, at.utc, |_| panic!("nobody records any more"));
     }
 }

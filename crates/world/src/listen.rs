@@ -141,6 +141,12 @@ impl Listens {
         self.0 & kind.bit() != 0
     }
 
+    /// Whether some kind is in both sets.
+    #[must_use]
+    pub const fn overlaps(self, other: Self) -> bool {
+        self.0 & other.0 != 0
+    }
+
     fn bits(one: Listen) -> u128 {
         let of = |way: Seen, topic: Topic| Kind::message(way, topic).bit();
         let all = |way: Seen| u128::from(u16::MAX) << (way as u8 * SLOTS);

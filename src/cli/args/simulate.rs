@@ -53,6 +53,9 @@ pub struct SimulatedSite {
     /// Where it is written what is wrong where, one fault a line
     #[arg(long, value_name = "FILE")]
     pub key: Option<PathBuf>,
+    /// Write no recording, but how many of the faults an audit finds, whatever a recorder made of the messages
+    #[arg(long, conflicts_with = "key")]
+    pub measure: bool,
 }
 
 /// How a simulated device reaches its broker.

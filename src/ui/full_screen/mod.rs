@@ -53,6 +53,7 @@ impl Viewer for FullScreen {
                 format!("{at:.0} connected again; {:.1} s were not seen", unseen.as_secs_f64())
             }
             Happening::Lost(why) => format!("{at:.0} the connection is lost: {why}"),
+            Happening::NotRecorded(why) => format!("{at:.0} nothing is recorded any more: {why}"),
         };
     }
 

@@ -1,4 +1,4 @@
-//! `state/maps`: what must hold for `maps` in every state.
+//! `state/maps`: what must hold for `maps` in every state. `state/maps-stay`: what must hold from one state to the next.
 //!
 //! What map actions do is left to the tests.
 
@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::finding::{broken, quote};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_view::{ActionView, Json, StateView};
+use tck_view::{ActionView, Json, List, MapState, StateView};
 use tck_world::{Listen, Observation, Topic};
 
 /// How many maps and how many deleteMap actions are kept in mind.
@@ -15,10 +15,21 @@ const LIMIT: usize = 1024;
 /// `state/maps`.
 pub(crate) const MAPS: Check = Check {
     name: "state/maps",
-    decides: &["MAP-07", "MAP-11", "MAP-14", "MAP-15", "MAP-31"],
+    decides: &["MAP-07", "MAP-11", "MAP-14", "MAP-15"],
     doc: "No pair of mapId and mapVersion is listed twice, at most one version of a mapId is ENABLED, agvPosition.mapId \
-          is an ENABLED map, maps is empty only without an active map, and no entry disappears unless deleteMap was \
-          sent.",
+          is an ENABLED map, and maps is empty only without an active map.",
+    arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[],
+    needs: &[StateView::maps],
+    start: |_| Box::new(Maps),
+};
+
+/// `state/maps-stay`.
+pub(crate) const MAPS_STAY: Check = Check {
+    name: "state/maps-stay",
+    decides: &["MAP-31"],
+    doc: "No entry of maps disappears from one state to the next unless deleteMap was sent for it.",
     arguments: &[],
     listens: &[
         Listen::Hook,
@@ -28,34 +39,35 @@ pub(crate) const MAPS: Check = Check {
     ],
     reads: &[],
     needs: &[StateView::maps],
-    start: |_| Box::new(Maps::default()),
+    start: |_| Box::new(MapsStay::default()),
 };
 
 type Pair = (String, String);
 
+struct Maps;
+
 #[derive(Default)]
-struct Maps {
+struct MapsStay {
     /// What the last state listed; nothing is known of it before the first, and after somebody had to do with the vehicle.
     listed: Option<BTreeSet<Pair>>,
     deleted: BTreeSet<Pair>,
 }
 
+/// The entries of a state, each once, and the entries that stand there again.
+fn entries(maps: &List<MapState>) -> (BTreeSet<Pair>, Vec<Pair>) {
+    let mut listed = BTreeSet::new();
+    let mut again = Vec::new();
+    for map in maps.iter().take(LIMIT) {
+        let pair = (short(map.map_id.or_empty()), short(map.map_version.or_empty()));
+        if !listed.insert(pair.clone()) {
+            again.push(pair);
+        }
+    }
+    (listed, again)
+}
+
 impl Running for Maps {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        if record.outside_influence() {
-            self.listed = None;
-        }
-        if let Some(message) = record.instant_actions_to_vehicle() {
-            for action in message
-                .all_actions()
-                .filter(|action| action.action_type.is("deleteMap"))
-            {
-                if self.deleted.len() < LIMIT {
-                    self.deleted
-                        .insert((parameter(action, "mapId"), parameter(action, "mapVersion")));
-                }
-            }
-        }
         let Some(state) = record.state() else {
             return false;
         };
@@ -63,17 +75,12 @@ impl Running for Maps {
             return false;
         };
         let seq = record.seq();
-        let mut now = BTreeSet::new();
+        for pair in entries(maps).1 {
+            findings.push(broken("MAP-07", seq, format!("maps lists {} twice", label(&pair))));
+        }
         let mut enabled: BTreeMap<&str, u32> = BTreeMap::new();
-        for map in maps.iter().take(LIMIT) {
-            let pair = (short(map.map_id.or_empty()), short(map.map_version.or_empty()));
-            if map.map_status.is("ENABLED") {
-                *enabled.entry(map.map_id.or_empty()).or_default() += 1;
-            }
-            let label = label(&pair);
-            if !now.insert(pair) {
-                findings.push(broken("MAP-07", seq, format!("maps lists {label} twice")));
-            }
+        for map in maps.iter().take(LIMIT).filter(|map| map.map_status.is("ENABLED")) {
+            *enabled.entry(map.map_id.or_empty()).or_default() += 1;
         }
         for (map, _) in enabled.iter().filter(|(_, count)| **count > 1) {
             let text = format!("more than one version of map {} is ENABLED", quote(map));
@@ -91,11 +98,35 @@ impl Running for Maps {
                 findings.push(broken("MAP-11", seq, text));
             }
         }
+        maps.total() > 0 || localized
+    }
+}
+
+impl Running for MapsStay {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        if record.outside_influence() {
+            self.listed = None;
+        }
+        if let Some(message) = record.instant_actions_to_vehicle() {
+            for action in message
+                .all_actions()
+                .filter(|action| action.action_type.is("deleteMap"))
+            {
+                if self.deleted.len() < LIMIT {
+                    self.deleted
+                        .insert((parameter(action, "mapId"), parameter(action, "mapVersion")));
+                }
+            }
+        }
+        let Some(maps) = record.state().and_then(|state| state.maps.there()) else {
+            return false;
+        };
+        let (now, _) = entries(maps);
         let known = self.listed.as_ref();
         for pair in known.into_iter().flat_map(|listed| listed.difference(&now)) {
             if !self.deleted.contains(pair) {
                 let text = format!("{} is gone, although no deleteMap was sent for it", label(pair));
-                findings.push(broken("MAP-31", seq, text));
+                findings.push(broken("MAP-31", record.seq(), text));
             }
         }
         // A map that comes back is a new one: the old deleteMap does not cover its next disappearance. It may
@@ -104,8 +135,8 @@ impl Running for Maps {
         for pair in back.cloned().collect::<Vec<Pair>>() {
             self.deleted.remove(&pair);
         }
-        self.listed = Some(now);
-        maps.total() > 0 || localized
+        let has_before = self.listed.replace(now).is_some();
+        has_before && maps.total() > 0
     }
 }
 
@@ -180,9 +211,9 @@ mod tests {
             &json!([{ "key": "mapId", "value": "hall" }, { "key": "mapVersion", "value": "2" }]),
         );
         trace.state(&both).state(&one);
-        assert!(trace.judge("state/maps").findings.is_empty());
+        assert!(trace.judge("state/maps-stay").findings.is_empty());
         trace.state(&both).state(&one);
-        assert_eq!(trace.judge("state/maps").summary(), ["MAP-31"]);
+        assert_eq!(trace.judge("state/maps-stay").summary(), ["MAP-31"]);
     }
 
     #[test]
@@ -190,7 +221,7 @@ mod tests {
         let mut trace = Trace::subscriber();
         trace.state(&maps(&[("hall", "1", "ENABLED"), ("yard", "1", "DISABLED")]));
         trace.hook().state(&maps(&[("hall", "1", "ENABLED")]));
-        assert!(trace.judge("state/maps").findings.is_empty());
+        assert!(trace.judge("state/maps-stay").findings.is_empty());
     }
 
     #[test]
@@ -204,6 +235,6 @@ mod tests {
             &json!([{ "key": "mapId", "value": "hall" }, { "key": "mapVersion", "value": "2" }]),
         );
         trace.state(&both).state(&maps(&[("hall", "1", "ENABLED")]));
-        assert!(trace.judge("state/maps").findings.is_empty());
+        assert!(trace.judge("state/maps-stay").findings.is_empty());
     }
 }

@@ -2,9 +2,10 @@
 //! places that are known.
 //!
 //! Every vehicle drives the tours of a recording of the reference devices again and again: it comes online, is sent its
-//! orders, and goes offline. [`faults`] says what can be wrong with a message.
+//! orders, and goes offline. [`faults`] says what can be wrong with a message, and [`impaired`] what a recorder makes of them.
 
 mod faults;
+mod impaired;
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -13,6 +14,7 @@ use jiff::Timestamp;
 use serde_json::{Value, json};
 
 pub use faults::{Injected, KINDS, Kind};
+pub use impaired::{Impairment, Recorded};
 
 /// A recording of two faultless vehicles of two protocol versions, and of the master control that commands them.
 const TOUR: &str = include_str!("../../../../fixtures/captures/two-versions.jsonl");

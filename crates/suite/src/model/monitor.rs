@@ -57,6 +57,8 @@ pub enum Recordings {
     Message,
     /// Each message with the topic that it came on, whatever else is missing.
     MessageOnTopic,
+    /// Each message with the factsheet of the vehicle, whatever else is missing.
+    MessageAndFactsheet,
     /// Only where nothing is missing: it holds messages against earlier ones.
     Unbroken,
     /// Only where nothing is missing, and where the recording says when messages came.
