@@ -21,6 +21,7 @@ mod log;
 mod message_stream;
 mod messages;
 mod outputs;
+mod page;
 mod pipeline;
 mod plan;
 mod problem;
@@ -36,6 +37,7 @@ mod simulate;
 mod slice;
 mod validate;
 mod watch;
+mod watch_page;
 
 use std::io::Write as _;
 use std::process::ExitCode;
