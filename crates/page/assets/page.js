@@ -9,6 +9,7 @@ const RETRY_AFTER = 2_000;
 const seen = { head: null, test: null, question: null, tests: [], findings: [], floor: null, vehicle: null, fleet: null };
 let source = null;
 let lastHeard = 0;
+let retryAt = 0;
 let ahead = 0;
 let isOver = false;
 let asked = 0;
@@ -214,8 +215,8 @@ function tick() {
   if (seen.head) put("ends", ends ? `About ${span(ends - now)} left, until ${clock(ends - ahead)}` : "");
   const isLost = !isOver && Date.now() - lastHeard > LOST_AFTER;
   show("lost", isLost || (source === null && !isOver));
-  if (isLost && source) {
-    lastHeard = Date.now() - LOST_AFTER + RETRY_AFTER;
+  if (isLost && source && Date.now() > retryAt) {
+    retryAt = Date.now() + LOST_AFTER;
     listen();
   }
 }
