@@ -95,7 +95,9 @@ fn shown(url: &str) -> Option<Value> {
 fn shown_when(url: &str, holds: impl Fn(&Value) -> bool) -> Value {
     let begun = Instant::now();
     loop {
-        let told = shown(url).expect("the page is served");
+        let Some(told) = shown(url) else {
+            panic!("the page is not served any more")
+        };
         if holds(&told) {
             return told;
         }
