@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 /// Rooms by layer; an arrow may point to the same layer or down, never up, and there are no circles on one layer. A room
 /// is a crate below `crates/`, a folder of the two crates that hold several (`base` and `net`), or a folder of the program.
-const LAYERS: [(&str, u8); 42] = [
+const LAYERS: [(&str, u8); 43] = [
     ("main", 6),
     ("cli", 6),
     ("ui", 6),
@@ -34,6 +34,7 @@ const LAYERS: [(&str, u8); 42] = [
     ("broker", 3),
     ("tap", 3),
     ("maps", 3),
+    ("page", 3),
     ("wire", 3),
     ("suite", 2),
     ("checks", 2),

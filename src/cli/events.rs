@@ -1,4 +1,5 @@
-//! `--events`: what happens in a run as JSON lines, for programs that follow it. docs/events.md has every kind.
+//! What happens in a run, for whoever follows it: the terminal, `--events` with JSON lines for programs (docs/events.md has
+//! every kind), and `--page` for people (docs/page.md).
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -8,12 +9,14 @@ use std::time::Duration;
 
 use serde_json::{Map, Value, json};
 
+use super::page::{OnPage, findings_of, follower};
 use super::problem::Problem;
 use super::screen::Screen;
 use crate::ui::{Follower, Output};
 use tck_engine::Watcher;
 use tck_journal::event::{Gate, Plan};
 use tck_net::link::mqtt::BenchInfo;
+use tck_page::{Facts, Outcome, Page};
 use tck_result::{RunResult, TestResult};
 use tck_run as run;
 use tck_suite::model::{Step, Test};
@@ -26,7 +29,10 @@ pub struct Followed {
     /// What a person sees.
     pub screen: Screen,
     stream: Option<Stream>,
+    page: Option<OnPage>,
     test: String,
+    /// Where the bundle is.
+    bundle: String,
 }
 
 /// The stream, which is written to from where a person is asked as well.
@@ -48,8 +54,8 @@ impl Stream {
 }
 
 impl Followed {
-    /// Nobody follows unless a file is given; `-` is standard output.
-    pub fn new(screen: Screen, events: Option<&Path>) -> Result<Self, Problem> {
+    /// No program follows unless a file is given, where `-` is standard output, and no person elsewhere without a page.
+    pub fn new(screen: Screen, events: Option<&Path>, page: Option<Page>) -> Result<Self, Problem> {
         let stream: Option<Box<dyn Write + Send>> = match events {
             None => None,
             Some(path) if path.as_os_str() == "-" => Some(Box::new(io::stdout())),
@@ -64,7 +70,9 @@ impl Followed {
         Ok(Self {
             screen,
             stream: stream.map(|stream| Stream(Arc::new(Mutex::new(Output::to(stream))))),
+            page: page.map(OnPage),
             test: String::new(),
+            bundle: String::new(),
         })
     }
 
@@ -76,17 +84,46 @@ impl Followed {
 
     /// Tells of questions to a person, and of their answers.
     pub fn follower(&self) -> Option<Follower> {
-        let (asked, answered) = (self.stream.clone()?, self.stream.clone()?);
+        let shown = self.page.as_ref().map(|page| follower(page.0.clone()));
+        let Some(stream) = self.stream.clone() else {
+            return shown;
+        };
+        let told = stream.clone();
+        let (asked, answered) = shown.map(|shown| (shown.asked, shown.answered)).unzip();
         Some(Follower {
-            asked: Box::new(move |question| asked.tell("question", json!(question))),
-            answered: Box::new(move |number, answer| {
-                answered.tell("answered", json!({ "number": number, "answer": answer.word() }));
+            asked: Box::new(move |question| {
+                stream.tell("question", json!(question));
+                if let Some(asked) = &asked {
+                    asked(question);
+                }
+            }),
+            answered: Box::new(move |number, reply| {
+                let from = reply.from.map(run::Place::word);
+                told.tell(
+                    "answered",
+                    json!({ "number": number, "answer": reply.answer.word(), "from": from }),
+                );
+                if let Some(answered) = &answered {
+                    answered(number, reply);
+                }
             }),
         })
     }
 
     /// The run begins.
     pub fn begun(&mut self, about: &About<'_>) {
+        self.bundle = about.bundle.display().to_string();
+        if let Some(OnPage(page)) = &self.page {
+            page.begun(Facts {
+                command: about.command.to_owned(),
+                role: about.role.to_owned(),
+                protocol: about.protocol.to_owned(),
+                manufacturer: about.manufacturer.to_owned(),
+                serial_number: about.serial_number.to_owned(),
+                run: about.run.to_owned(),
+                broker: about.broker.to_owned(),
+            });
+        }
         self.tell(
             "run-begun",
             json!({ "format": FORMAT, "run": about.run, "role": about.role, "protocol": about.protocol,
@@ -97,6 +134,17 @@ impl Followed {
 
     /// The run has ended, and its bundle is written.
     pub fn ended(&mut self, result: &RunResult, root: Option<&str>, exit: u8) {
+        if let Some(OnPage(page)) = &self.page {
+            page.findings(findings_of(result));
+            page.ended(Outcome {
+                verdict: result
+                    .verdict
+                    .map_or("none", tck_base::verdict::Verdict::word)
+                    .to_owned(),
+                statement: tck_report::statement::statement(result),
+                report: format!("{}/report.html", self.bundle),
+            });
+        }
         for requirement in &result.requirements {
             if let Some(verdict) = requirement
                 .verdict
@@ -133,6 +181,10 @@ pub struct About<'a> {
     pub serial_number: &'a str,
     /// Where the bundle is going to be.
     pub bundle: &'a Path,
+    /// `run` or `certify`.
+    pub command: &'a str,
+    /// The broker that is used, in words.
+    pub broker: &'a str,
 }
 
 impl Watcher for Followed {
@@ -141,6 +193,15 @@ impl Watcher for Followed {
         let members = json!({ "test": self.test, "path": step.path, "title": step.title,
             "does": step.verb_span.text() });
         self.tell("step-begun", members);
+        if let Some(page) = &mut self.page {
+            page.waiting(step);
+        }
+    }
+
+    fn awaits(&mut self, left: Duration) {
+        if let Some(page) = &mut self.page {
+            page.awaits(left);
+        }
     }
 }
 
@@ -154,6 +215,9 @@ impl run::Progress for Followed {
         });
         let tests: Vec<Value> = tests.collect();
         self.tell("planned", json!({ "tests": tests }));
+        if let Some(page) = &mut self.page {
+            page.planned(plan);
+        }
     }
 
     fn test_begun(&mut self, test: &Test, number: usize, of: usize) {
@@ -161,6 +225,9 @@ impl run::Progress for Followed {
         self.test.clone_from(&test.id);
         let members = json!({ "test": test.id, "title": test.title, "number": number, "of": of });
         self.tell("test-begun", members);
+        if let Some(page) = &mut self.page {
+            page.test_begun(test, number, of);
+        }
     }
 
     fn test_ended(&mut self, result: &TestResult) {
@@ -175,19 +242,31 @@ impl run::Progress for Followed {
             "reason": result.reason, "decisions": decisions,
             "repetition": result.repetitions.last().map(|repetition| repetition.number) });
         self.tell("test-ended", members);
+        if let Some(page) = &mut self.page {
+            page.test_ended(result);
+        }
     }
 
     fn note(&mut self, text: &str) {
         self.screen.note(text);
         self.tell("note", json!({ "text": text }));
+        if let Some(page) = &mut self.page {
+            page.note(text);
+        }
     }
 
     fn left(&mut self, left: Duration) {
         self.screen.left(left);
+        if let Some(page) = &mut self.page {
+            page.left(left);
+        }
     }
 
     fn expects_device(&mut self, bench: &BenchInfo) {
         self.screen.expects_device(bench);
         self.tell("device-expected", json!({ "address": bench.device_url }));
+        if let Some(page) = &mut self.page {
+            page.expects_device(bench);
+        }
     }
 }

@@ -22,6 +22,7 @@ mod log;
 mod message_stream;
 mod messages;
 mod outputs;
+mod page;
 mod pipeline;
 mod plan;
 mod problem;
@@ -37,6 +38,7 @@ mod simulate;
 mod slice;
 mod validate;
 mod watch;
+mod watch_page;
 
 use std::io::Write as _;
 use std::process::ExitCode;

@@ -3,7 +3,7 @@
 
 use std::fmt::Write as _;
 use std::io::{self, IsTerminal as _, Write};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use crossterm::event::{Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
@@ -13,7 +13,7 @@ use tokio::sync::watch;
 
 use super::keyboard::typed;
 use super::output::escaped;
-use tck_run::{Answer, Board, Person, Question, Wanted};
+use tck_run::{Answer, Board, Person, Place, Question, Reply, Wanted};
 
 /// How long the keyboard is read before it is looked whether the answer is still wanted.
 const GLANCE: Duration = Duration::from_millis(50);
@@ -28,6 +28,8 @@ pub struct Prompter {
 struct Shared {
     /// Ends the run.
     stop: watch::Sender<bool>,
+    /// Where somebody has ended it, other than by a signal.
+    stopped_at: Arc<OnceLock<Place>>,
     /// What is drawn otherwise, and what the run is about now.
     about: Mutex<About>,
     /// The open question, for answers from elsewhere.
@@ -40,8 +42,8 @@ struct Shared {
 
 /// Takes a question that is asked.
 type OnAsked = Box<dyn Fn(&Question) + Send>;
-/// Takes the number of a question, and its answer.
-type OnAnswered = Box<dyn Fn(u64, &Answer) + Send>;
+/// Takes the number of a question, and what came of it.
+type OnAnswered = Box<dyn Fn(u64, &Reply) + Send>;
 
 /// Hears of questions and of their answers.
 pub struct Follower {
@@ -76,6 +78,7 @@ impl Prompter {
         Self {
             shared: Arc::new(Shared {
                 stop,
+                stopped_at: Arc::default(),
                 about: Mutex::new(about),
                 board: Board::default(),
                 follower: Mutex::new(None),
@@ -88,6 +91,19 @@ impl Prompter {
     #[must_use]
     pub fn board(&self) -> Board {
         self.shared.board.clone()
+    }
+
+    /// Ends the run in good order, as Ctrl-C does once.
+    pub fn stop(&self, place: Place) {
+        // Whoever was first has ended it.
+        let _ = self.shared.stopped_at.set(place);
+        self.shared.stop.send_replace(true);
+    }
+
+    /// Where somebody has ended the run, once somebody has, other than by a signal.
+    #[must_use]
+    pub fn stopped_at(&self) -> Arc<OnceLock<Place>> {
+        Arc::clone(&self.shared.stopped_at)
     }
 
     /// Who hears of questions from now on.
@@ -166,7 +182,7 @@ fn wanted_of(about: &About, what: &str) -> String {
 }
 
 impl Person for Prompter {
-    fn ask(&self, what: &str, within: Duration, wanted: &Wanted) -> Answer {
+    fn ask(&self, what: &str, within: Duration, wanted: &Wanted) -> Reply {
         let _alone = held(&self.shared.terminal);
         let about = held(&self.shared.about).clone();
         about.bar.suspend(|| {
@@ -177,7 +193,7 @@ impl Person for Prompter {
                     terminal,
                     "\r\n-- the run ends, and does not wait for this --\r\n{wanted}"
                 );
-                return Answer::GivenUp;
+                return Reply::without(Answer::GivenUp);
             }
             let place = (about.test.clone(), about.step.clone());
             let number = self.shared.board.put_up(place, what, within);
@@ -191,20 +207,20 @@ impl Person for Prompter {
                 stop: &self.shared.stop,
                 board: &self.shared.board,
             };
-            let answer = if Self::is_attended() {
+            let reply = if Self::is_attended() {
                 Raw::on().and_then(|_raw| asked.put(&heading, &mut terminal))
             } else {
                 asked.wait(&heading, &mut terminal)
             };
             self.shared.board.take_down();
-            let answer = answer.unwrap_or_else(|error| Answer::Unasked(error.to_string()));
+            let reply = reply.unwrap_or_else(|error| Reply::without(Answer::Unasked(error.to_string())));
             if let Some(follower) = &*held(&self.shared.follower) {
-                (follower.answered)(number, &answer);
+                (follower.answered)(number, &reply);
             }
-            if answer == Answer::End {
-                self.shared.stop.send_replace(true);
+            if reply.answer == Answer::End {
+                self.stop(reply.from.unwrap_or(Place::Terminal));
             }
-            answer
+            reply
         })
     }
 }
@@ -244,57 +260,58 @@ struct Asked<'a> {
 
 impl Asked<'_> {
     /// The answer, as far as it does not come from the keyboard; `None` as long as there is none.
-    fn otherwise(&self, left: Duration) -> Option<Answer> {
+    fn otherwise(&self, left: Duration) -> Option<Reply> {
         if let Some(given) = self.board.given() {
             return Some(given);
         }
         if left.is_zero() {
-            return Some(Answer::Silence);
+            return Some(Reply::without(Answer::Silence));
         }
-        (self.wanted.is_given_up() || *self.stop.borrow()).then_some(Answer::GivenUp)
+        let is_over = self.wanted.is_given_up() || *self.stop.borrow();
+        is_over.then(|| Reply::without(Answer::GivenUp))
     }
 
     /// Asks at the terminal.
-    fn put(&self, heading: &str, terminal: &mut impl Write) -> io::Result<Answer> {
+    fn put(&self, heading: &str, terminal: &mut impl Write) -> io::Result<Reply> {
         // What was typed before the question is no answer to it.
         while typed(Duration::ZERO)?.is_some() {}
         write!(terminal, "\x07{heading}")?;
         let until = Instant::now() + self.within;
         let mut shown = None;
-        let answer = loop {
+        let reply = loop {
             let left = until.saturating_duration_since(Instant::now());
             if shown != Some(left.as_secs()) {
                 shown = Some(left.as_secs());
                 write!(terminal, "\r\x1b[2K{}", keys(left))?;
                 terminal.flush()?;
             }
-            if let Some(answer) = self.otherwise(left) {
-                break answer;
+            if let Some(reply) = self.otherwise(left) {
+                break reply;
             }
             if let Some(Event::Key(key)) = typed(GLANCE.min(left))?
                 && let Some(answer) = meaning(key)
             {
-                break answer;
+                break Reply::from(answer, Place::Terminal);
             }
         };
-        write!(terminal, "\r\x1b[2K   {}\r\n", said(&answer))?;
+        write!(terminal, "\r\x1b[2K   {}\r\n", said(&reply.answer))?;
         terminal.flush()?;
-        Ok(answer)
+        Ok(reply)
     }
 
     /// Says what is asked, and waits for an answer from elsewhere.
-    fn wait(&self, heading: &str, terminal: &mut impl Write) -> io::Result<Answer> {
+    fn wait(&self, heading: &str, terminal: &mut impl Write) -> io::Result<Reply> {
         write!(terminal, "{}", heading.replace('\r', ""))?;
         let until = Instant::now() + self.within;
-        let answer = loop {
+        let reply = loop {
             let left = until.saturating_duration_since(Instant::now());
-            if let Some(answer) = self.otherwise(left) {
-                break answer;
+            if let Some(reply) = self.otherwise(left) {
+                break reply;
             }
             std::thread::sleep(GLANCE.min(left));
         };
-        writeln!(terminal, "   {}", said(&answer))?;
-        Ok(answer)
+        writeln!(terminal, "   {}", said(&reply.answer))?;
+        Ok(reply)
     }
 }
 
@@ -385,6 +402,6 @@ mod tests {
             Duration::from_secs(600),
             &Wanted::default(),
         );
-        assert_eq!(asked, Answer::GivenUp);
+        assert_eq!(asked, Reply::without(Answer::GivenUp));
     }
 }

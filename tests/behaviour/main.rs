@@ -7,6 +7,7 @@
 mod asked;
 mod auditing;
 mod bench;
+mod beside;
 mod broken;
 mod brokers;
 mod bystanders;

@@ -46,8 +46,8 @@ mod tests {
 
     use super::Layout;
 
-    /// The doubts about a layout with one edge from (5, 0) to (15, 0) and this curve.
-    fn doubts(trajectory: &serde_json::Value) -> Vec<String> {
+    /// A layout with one edge from (5, 0) to (15, 0) and this curve.
+    fn one_edge(trajectory: &serde_json::Value) -> Layout {
         let node = |id: &str, x: f64| {
             json!({ "nodeId": id, "mapId": "m", "nodePosition": { "x": x, "y": 0.0 },
                 "vehicleTypeNodeProperties": [{ "vehicleTypeId": "T", "theta": 0.0 }] })
@@ -58,7 +58,11 @@ mod tests {
         let file = json!({ "metaInformation": { "lifVersion": "1.0.0" }, "layouts": [layout] });
         let layout = Layout::from_lif(&Source::new("hall.lif.json", file.to_string()), None).expect("a layout");
         assert_eq!(layout.curves(), usize::from(!trajectory.is_null()));
-        layout.doubts()
+        layout
+    }
+
+    fn doubts(trajectory: &serde_json::Value) -> Vec<String> {
+        one_edge(trajectory).doubts()
     }
 
     fn curve(from: f64, to: f64) -> serde_json::Value {
@@ -82,5 +86,22 @@ mod tests {
             ]
         );
         assert!(!doubts(&json!({ "degree": 3, "knotVector": [0.0], "controlPoints": [] })).is_empty());
+    }
+
+    #[test]
+    fn the_way_over_an_edge_is_its_curve_or_the_straight_line_between_its_nodes() {
+        let line = |trajectory: &serde_json::Value| {
+            let layout = one_edge(trajectory);
+            let edge = layout.edges().next().expect("an edge").clone();
+            layout.line(&edge)
+        };
+        let straight = [(5.0, 0.0), (15.0, 0.0)];
+        assert_eq!(line(&serde_json::Value::Null), straight);
+        let unreadable = json!({ "degree": 3, "knotVector": [0.0], "controlPoints": [] });
+        assert_eq!(line(&unreadable), straight);
+        let bow = json!({ "degree": 2, "knotVector": [0.0, 0.0, 0.0, 1.0, 1.0, 1.0],
+            "controlPoints": [{ "x": 5.0, "y": 0.0 }, { "x": 10.0, "y": 4.0 }, { "x": 15.0, "y": 0.0 }] });
+        let points = line(&bow);
+        assert!(points.len() > 2 && points.iter().any(|(_, y)| *y > 1.5), "{points:?}");
     }
 }

@@ -6,6 +6,7 @@ use serde_json::{Map, Value};
 
 use super::{CourseError, Station};
 use tck_base::diagnostic;
+use tck_base::nurbs::Curve;
 use tck_profile::LayoutList;
 
 /// mapId of [`Layout::built_in`].
@@ -321,6 +322,18 @@ impl Layout {
     #[must_use]
     pub fn edge(&self, start: &str, end: &str) -> Option<&Edge> {
         self.edges.get(&(start.to_owned(), end.to_owned()))
+    }
+
+    /// The way over an edge as points in metres, both ends included: along its curve where it has one that can be calculated with.
+    #[must_use]
+    pub fn line(&self, edge: &Edge) -> Vec<(f64, f64)> {
+        let trajectory = edge.trajectory.as_ref();
+        let curve = trajectory.and_then(|trajectory| Curve::read(trajectory).0);
+        if let Some(curve) = curve {
+            return curve.path().points().collect();
+        }
+        let ends = [self.node(&edge.start), self.node(&edge.end)];
+        ends.into_iter().flatten().map(|node| (node.x, node.y)).collect()
     }
 
     /// Whether it has a place for the station of this variable, such as `pick`.

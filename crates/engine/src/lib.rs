@@ -26,7 +26,7 @@ pub use compose::Composer;
 pub use compose_error::ComposeError;
 pub use ids::IdForm;
 pub use operator::{Asks, HookOutcome, Operator};
-pub use recorder::{RecordError, Recorder};
+pub use recorder::{Onlooker, RecordError, Recorder};
 
 use tck_base::clock::Moment;
 use tck_base::device::Publication;
@@ -61,6 +61,11 @@ impl From<JudgeError> for EngineError {
 pub trait Watcher {
     /// A step has begun to wait.
     fn waiting(&mut self, step: &Step);
+
+    /// What the step waits for has to come within this time.
+    fn awaits(&mut self, left: Duration) {
+        let _ = left;
+    }
 
     /// The device has just gone, as far as it shows; the text says how.
     fn gone(&mut self, how: &str) {
@@ -477,6 +482,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
         watcher: &mut dyn Watcher,
     ) -> Result<StepEnd, EngineError> {
         let mut probed = false;
+        let mut told = None;
         loop {
             self.tell_gone(watcher);
             let Some(test) = self.recorder.judge().current() else {
@@ -492,6 +498,10 @@ impl<L: Link, O: Operator> Engine<L, O> {
                 return Ok(StepEnd::Interrupted);
             }
             let now = self.link.now().moment;
+            if told != Some(until) {
+                told = Some(until);
+                watcher.awaits(until.since(now));
+            }
             let silence = self.recorder.judge().timeline().falls_silent();
             let silence = silence.filter(|silence| *silence > now && *silence < until);
             let happened = tokio::select! {

@@ -19,6 +19,9 @@ pub enum RecordError {
     Judge(#[from] JudgeError),
 }
 
+/// Is shown every record once it is written and judged.
+pub type Onlooker = Box<dyn FnMut(&Arc<Entry>) + Send>;
+
 /// Records and judges.
 pub struct Recorder {
     journal: Journal,
@@ -27,6 +30,7 @@ pub struct Recorder {
     guard: FloodGuard,
     /// Whether what others do was left out once; it is said once.
     leaves_out: bool,
+    onlooker: Option<Onlooker>,
 }
 
 impl Recorder {
@@ -63,7 +67,13 @@ impl Recorder {
             judge,
             guard,
             leaves_out: false,
+            onlooker: None,
         })
+    }
+
+    /// Shows every record from now on to somebody who looks on.
+    pub fn is_watched_by(&mut self, onlooker: Onlooker) {
+        self.onlooker = Some(onlooker);
     }
 
     /// Records one occurrence: file first, then the judge. Of clients that are not the device only so much is recorded; what
@@ -92,6 +102,9 @@ impl Recorder {
             self.guard.observe_other(&entry);
         } else {
             self.guard.observe(&entry);
+        }
+        if let Some(onlooker) = &mut self.onlooker {
+            onlooker(&entry);
         }
         Ok(entry)
     }

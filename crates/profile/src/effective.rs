@@ -200,6 +200,7 @@ impl Taken<'_> {
                 client_id: self.text("bench.client-id").unwrap_or_default(),
                 maps_listen: self.text("bench.maps-listen").unwrap_or_default(),
                 maps_host: self.text("bench.maps-host"),
+                page: self.text("bench.page"),
                 tls_cert: self.path("bench.tls-cert"),
                 tls_key: self.path("bench.tls-key"),
                 tls_ca: self.path("bench.tls-ca"),

@@ -349,6 +349,7 @@ pub const KEYS: &[Key] = &[
     key("bench.client-id", Kind::Text),
     key("bench.maps-listen", Kind::Address),
     key("bench.maps-host", Kind::Text),
+    key("bench.page", Kind::Address),
     key("bench.tls-cert", Kind::File),
     key("bench.tls-key", Kind::File),
     key("bench.tls-ca", Kind::File),

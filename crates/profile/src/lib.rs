@@ -219,6 +219,8 @@ pub struct Bench {
     pub maps_listen: String,
     /// Host name in the links to map files; that of `maps_listen` when absent.
     pub maps_host: Option<String>,
+    /// Where the page for the people beside the vehicle is served, as `host:port`.
+    pub page: Option<String>,
     /// Certificate the tap shows the device (PEM).
     pub tls_cert: Option<PathBuf>,
     /// Its key (PEM).

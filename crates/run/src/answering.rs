@@ -14,8 +14,9 @@ use axum::response::{IntoResponse, Response};
 use serde_json::{Value, json};
 use tokio::task::JoinHandle;
 
-use super::person::Answer;
+use super::person::{Answer, Place};
 use super::questions::Board;
+use tck_net::bench::secret::Secret;
 
 /// Longest body of an answer, in bytes.
 const LONGEST: usize = 1_024;
@@ -49,7 +50,7 @@ pub struct Answering {
 #[derive(Clone)]
 struct Shared {
     board: Board,
-    token: String,
+    token: Secret,
     port: u16,
 }
 
@@ -66,10 +67,11 @@ impl Answering {
         let cannot = |reason| AnsweringError::Listen { address, reason };
         let listener = tokio::net::TcpListener::bind(address).await.map_err(cannot)?;
         let address = listener.local_addr().map_err(cannot)?;
-        let token = uuid::Uuid::new_v4().simple().to_string();
+        let token = Secret::draw();
+        let url = format!("http://{address}/{}", token.word());
         let shared = Shared {
             board,
-            token: token.clone(),
+            token,
             port: address.port(),
         };
         let router = Router::new().fallback(respond).with_state(shared);
@@ -77,10 +79,7 @@ impl Answering {
             // Without it the terminal still asks.
             let _ = axum::serve(listener, router).await;
         });
-        Ok(Self {
-            url: format!("http://{address}/{token}"),
-            serving,
-        })
+        Ok(Self { url, serving })
     }
 
     /// What `/question` and `/answer` follow.
@@ -102,7 +101,7 @@ async fn respond(State(shared): State<Shared>, request: Request) -> Response {
     }
     let (parts, body) = request.into_parts();
     let path = parts.uri.path().trim_start_matches('/').to_owned();
-    let Some((_, what)) = path.split_once('/').filter(|(token, _)| is_same(token, &shared.token)) else {
+    let Some((_, what)) = path.split_once('/').filter(|(token, _)| shared.token.is(token)) else {
         return refusal(StatusCode::NOT_FOUND, "there is nothing here");
     };
     match (&parts.method, what) {
@@ -121,7 +120,7 @@ async fn answer(board: &Board, body: Body) -> Response {
         let form = r#"an answer is {"number": 1, "answer": "done"}, or "skip", or "end""#;
         return refusal(StatusCode::BAD_REQUEST, form);
     };
-    if board.answer(number, answer) {
+    if board.answer(number, answer, Place::Http) {
         told(StatusCode::OK, &json!({ "answered": number }))
     } else {
         refusal(StatusCode::CONFLICT, "this question is not open any more")
@@ -155,15 +154,6 @@ fn is_for_this_machine(request: &Request, port: u16) -> bool {
     is_local && given.parse() == Ok(port)
 }
 
-/// Whether two tokens are the same, in a time that does not tell where they differ.
-fn is_same(one: &str, other: &str) -> bool {
-    let differing = one
-        .bytes()
-        .zip(other.bytes())
-        .fold(0, |all, (one, other)| all | (one ^ other));
-    one.len() == other.len() && differing == 0
-}
-
 fn refusal(status: StatusCode, why: &str) -> Response {
     told(status, &json!({ "error": why }))
 }
@@ -180,6 +170,7 @@ mod tests {
     use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 
     use super::*;
+    use crate::person::Reply;
 
     /// Sends bytes and gives status and body of what comes back.
     async fn said(url: &str, request: &str) -> (u16, String) {
@@ -222,7 +213,7 @@ mod tests {
         assert!(told["question"]["secondsLeft"].as_u64().unwrap() > 20);
         let done = request("POST", url, "/TOKEN/answer", None, r#"{"number":1,"answer":"done"}"#);
         assert_eq!(said(url, &done).await.0, 200);
-        assert_eq!(board.given(), Some(Answer::Done));
+        assert_eq!(board.given(), Some(Reply::from(Answer::Done, Place::Http)));
         assert_eq!(said(url, &done).await.0, 409);
     }
 

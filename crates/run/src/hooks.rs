@@ -9,7 +9,7 @@ use std::time::Duration;
 use serde_json::{Map, Value};
 
 use super::device::{DeviceProcess, GOODBYE_LIMIT};
-use super::person::{Answer, Person, ask};
+use super::person::{Answer, Person, Reply, ask};
 use super::program::program;
 use tck_engine::{Asks, HookOutcome, Operator};
 use tck_net::bench::web;
@@ -266,11 +266,12 @@ impl Asked {
     }
 }
 
-fn answered(answer: Answer, within: Duration) -> HookOutcome {
-    match answer {
-        Answer::Done => HookOutcome::Done("the operator answered: done".to_owned()),
-        Answer::Skip => HookOutcome::Skipped("the operator skipped the test".to_owned()),
-        Answer::End => HookOutcome::Failed("the operator ended the run".to_owned()),
+fn answered(reply: Reply, within: Duration) -> HookOutcome {
+    let place = reply.from.map_or_else(String::new, |place| format!(", {place}"));
+    match reply.answer {
+        Answer::Done => HookOutcome::Done(format!("the operator answered: done{place}")),
+        Answer::Skip => HookOutcome::Skipped(format!("the operator skipped the test{place}")),
+        Answer::End => HookOutcome::Failed(format!("the operator ended the run{place}")),
         // Nobody has broken anything: the test is undecided.
         Answer::Silence => HookOutcome::Unanswered(format!("nobody answered within {}", show_duration(within))),
         Answer::GivenUp => HookOutcome::Failed("given up: the run ends".to_owned()),

@@ -62,7 +62,7 @@ pub use latest::{LATEST, forget_latest, newest};
 pub use live_run::{Hold, LiveRun, ProfileContext, RunError};
 pub use outputs::{OutputError, sources, write_all, write_result};
 pub use overheard::Overheard;
-pub use person::{Answer, Person, Wanted};
+pub use person::{Answer, Person, Place, Reply, Wanted};
 pub use plan::{How, PlanLine, RunPlan, Use, Waits};
 pub use questions::{Board, Question};
 pub use request::{Request, RequestBuilder, Shard};

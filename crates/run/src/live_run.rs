@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use serde_json::Value;
 
@@ -12,7 +12,7 @@ use super::files::files;
 use super::hooks::Means;
 use super::operators::{Commands, hooks_of};
 use super::overheard::{Overheard, overhear};
-use super::person::Person;
+use super::person::{Person, Place};
 use super::plan::{How, RunPlan};
 use super::request::Request;
 use super::selection::Selection;
@@ -23,7 +23,7 @@ use super::site::{Topics, bench_of, certificates, reach, resolve};
 use super::virtual_run::{Silent, VirtualRun, run_silently};
 use tck_base::clock::WallClock;
 use tck_base::diagnostic::Diagnostic;
-use tck_engine::{Composer, Engine, EngineError, Operator, RecordError, Recorder};
+use tck_engine::{Composer, Engine, EngineError, Onlooker, Operator, RecordError, Recorder};
 use tck_journal::event::{Event, Occurrence, Source as Seen};
 use tck_journal::file::JournalWriter;
 use tck_journal::{Journal, Reason, Vantage};
@@ -59,6 +59,10 @@ pub struct LiveRun {
     pub hold: Hold,
     /// Turns true when nobody waits any more for the run to end in good order.
     pub quit: Option<tokio::sync::watch::Receiver<bool>>,
+    /// Where a person has ended the run, once one has; a signal says nothing of that.
+    pub stopped_at: Arc<OnceLock<Place>>,
+    /// Who is shown every record.
+    pub onlooker: Option<Onlooker>,
     /// What the vehicle has left at its broker, once somebody has looked.
     overheard: Option<Overheard>,
 }
@@ -140,6 +144,8 @@ impl LiveRun {
             device_log: None,
             hold: Hold::default(),
             quit: None,
+            stopped_at: Arc::default(),
+            onlooker: None,
             overheard: None,
         }
     }
@@ -187,6 +193,8 @@ impl LiveRun {
             device_log: None,
             hold: Hold::default(),
             quit: None,
+            stopped_at: Arc::default(),
+            onlooker: None,
             overheard: None,
         })
     }
@@ -326,6 +334,8 @@ impl LiveRun {
             clock,
             earlier: self.earlier,
             quit: self.quit,
+            stopped_at: self.stopped_at,
+            onlooker: self.onlooker,
             rests,
         };
         match self.source {
@@ -390,6 +400,8 @@ struct Stage<'a> {
     clock: WallClock,
     earlier: Option<Journal>,
     quit: Option<tokio::sync::watch::Receiver<bool>>,
+    stopped_at: Arc<OnceLock<Place>>,
+    onlooker: Option<Onlooker>,
     rests: Option<Rests>,
 }
 
@@ -441,16 +453,23 @@ impl Stage<'_> {
         let (header, setup) = self.device.on(bench, self.request, self.library, self.pack);
         let header = Box::new(header);
         let first = Occurrence::harness(self.clock.now(), Event::RunBegun { header });
-        let recorder = Recorder::begin(&self.library.rules, self.writer, self.earlier, first)?;
+        let mut recorder = Recorder::begin(&self.library.rules, self.writer, self.earlier, first)?;
+        if let Some(onlooker) = self.onlooker {
+            recorder.is_watched_by(onlooker);
+        }
         let operator = match &fleet {
             None => WithFleet::alone(operator),
             Some(fleet) => WithFleet::start(operator, fleet, &info.broker, self.clock, &link.reporter()),
         };
         // It is recorded when it comes, whatever the harness is doing then.
-        let (mut interrupted, reporter) = (self.interrupt.clone(), link.reporter());
+        let (mut interrupted, reporter, stopped_at) = (self.interrupt.clone(), link.reporter(), self.stopped_at);
         let recorded = tokio::spawn(async move {
             if interrupted.wait_for(|interrupted| *interrupted).await.is_ok() {
                 reporter.report(Seen::Operator, None, Event::Interrupted).await;
+                if let Some(place) = stopped_at.get() {
+                    let text = format!("the run was ended {place}");
+                    reporter.report(Seen::Operator, None, Event::Note { text }).await;
+                }
             }
         });
         let patience = Patience {

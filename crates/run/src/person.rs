@@ -36,6 +36,65 @@ impl Answer {
     }
 }
 
+/// Where a person has answered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// At the keyboard of the terminal.
+    Terminal,
+    /// Over HTTP, as a program does.
+    Http,
+    /// On the page for the people beside the vehicle.
+    Page,
+}
+
+impl Place {
+    /// The word for it in streams of events.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Terminal => "terminal",
+            Self::Http => "http",
+            Self::Page => "page",
+        }
+    }
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Terminal => "at the terminal",
+            Self::Http => "over HTTP",
+            Self::Page => "on the page",
+        })
+    }
+}
+
+/// What came of a question, and where the answer was given if a person gave one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Reply {
+    /// What came of it.
+    pub answer: Answer,
+    /// Where a person has answered.
+    pub from: Option<Place>,
+}
+
+impl Reply {
+    /// The answer of a person.
+    #[must_use]
+    pub fn from(answer: Answer, place: Place) -> Self {
+        Self {
+            answer,
+            from: Some(place),
+        }
+    }
+
+    /// What came of it without an answer.
+    #[must_use]
+    pub fn without(answer: Answer) -> Self {
+        Self { answer, from: None }
+    }
+}
+
 /// Whether an answer is still wanted.
 #[derive(Clone, Debug, Default)]
 pub struct Wanted(Arc<AtomicBool>);
@@ -62,15 +121,17 @@ impl Drop for Waiting {
 pub trait Person: Send + Sync + std::fmt::Debug {
     /// Asks for something to be done, and waits for the answer for this long at most. Ends soon after the answer is not
     /// wanted any more.
-    fn ask(&self, what: &str, within: Duration, wanted: &Wanted) -> Answer;
+    fn ask(&self, what: &str, within: Duration, wanted: &Wanted) -> Reply;
 }
 
 /// Asks a person, and gives the question up when nobody waits for the answer any more.
-pub(super) async fn ask(person: &Arc<dyn Person>, what: String, within: Duration) -> Answer {
+pub(super) async fn ask(person: &Arc<dyn Person>, what: String, within: Duration) -> Reply {
     let waiting = Waiting(Wanted::default());
     let (person, wanted) = (Arc::clone(person), waiting.0.clone());
     let asked = tokio::task::spawn_blocking(move || person.ask(&what, within, &wanted));
-    asked.await.unwrap_or_else(|error| Answer::Unasked(error.to_string()))
+    asked
+        .await
+        .unwrap_or_else(|error| Reply::without(Answer::Unasked(error.to_string())))
 }
 
 #[cfg(test)]
@@ -81,12 +142,12 @@ mod tests {
     struct Slow(Arc<AtomicBool>);
 
     impl Person for Slow {
-        fn ask(&self, _: &str, _: Duration, wanted: &Wanted) -> Answer {
+        fn ask(&self, _: &str, _: Duration, wanted: &Wanted) -> Reply {
             while !wanted.is_given_up() {
                 std::thread::sleep(Duration::from_millis(5));
             }
             self.0.store(true, Ordering::Relaxed);
-            Answer::GivenUp
+            Reply::without(Answer::GivenUp)
         }
     }
 

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use super::person::Answer;
+use super::person::{Answer, Place, Reply};
 
 /// A question to the person beside the device, as it stands now.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -33,7 +33,7 @@ pub struct Board(Arc<Mutex<State>>);
 struct State {
     asked: u64,
     open: Option<Open>,
-    given: Option<Answer>,
+    given: Option<Reply>,
 }
 
 #[derive(Debug)]
@@ -82,19 +82,19 @@ impl Board {
     }
 
     /// Leaves an answer to the question of this number; `false` when it is not open, or answered already.
-    pub fn answer(&self, number: u64, answer: Answer) -> bool {
+    pub fn answer(&self, number: u64, answer: Answer, place: Place) -> bool {
         let mut state = self.state();
         let is_open = state.open.as_ref().is_some_and(|open| open.question.number == number);
         if !is_open || state.given.is_some() {
             return false;
         }
-        state.given = Some(answer);
+        state.given = Some(Reply::from(answer, place));
         true
     }
 
     /// The answer that was left, if there is one.
     #[must_use]
-    pub fn given(&self) -> Option<Answer> {
+    pub fn given(&self) -> Option<Reply> {
         self.state().given.clone()
     }
 
@@ -111,21 +111,21 @@ mod tests {
     fn only_the_open_question_is_answered_and_only_once() {
         let board = Board::default();
         assert_eq!(board.question(), None);
-        assert!(!board.answer(1, Answer::Done));
+        assert!(!board.answer(1, Answer::Done, Place::Http));
         let about = (Some("state/emergency-stop".to_owned()), None);
         let number = board.put_up(about, "Press it.", Duration::from_secs(60));
         assert_eq!(number, 1);
         let open = board.question().unwrap();
         assert!(open.text == "Press it." && (59..=60).contains(&open.seconds_left));
-        assert!(!board.answer(2, Answer::Done));
-        assert!(board.answer(1, Answer::Skip));
-        assert!(!board.answer(1, Answer::Done));
-        assert_eq!(board.given(), Some(Answer::Skip));
+        assert!(!board.answer(2, Answer::Done, Place::Http));
+        assert!(board.answer(1, Answer::Skip, Place::Page));
+        assert!(!board.answer(1, Answer::Done, Place::Http));
+        assert_eq!(board.given(), Some(Reply::from(Answer::Skip, Place::Page)));
         board.take_down();
         assert!(board.question().is_none() && board.given().is_none());
         assert_eq!(board.put_up((None, None), "Pull it.", Duration::from_secs(1)), 2);
         assert!(
-            !board.answer(1, Answer::Done),
+            !board.answer(1, Answer::Done, Place::Terminal),
             "an answer to the question before is none to this one"
         );
     }

@@ -589,6 +589,10 @@ impl Watcher for AsWatcher<'_> {
         self.0.waiting(step);
     }
 
+    fn awaits(&mut self, left: Duration) {
+        self.0.awaits(left);
+    }
+
     fn gone(&mut self, how: &str) {
         self.0.note(how);
     }

@@ -120,6 +120,12 @@ pub struct VehicleStatus {
     pub nodes: (usize, usize),
     /// The last node.
     pub last_node: Option<String>,
+    /// Where it says that it is, in metres, vouched for or not.
+    pub spot: Option<(f64, f64)>,
+    /// The map it says it is on.
+    pub map: Option<String>,
+    /// Its heading in radians, where it knows its position.
+    pub heading: Option<f64>,
     /// Whether it says that it drives.
     pub driving: bool,
     /// Actions that are not over.
@@ -155,6 +161,9 @@ impl VehicleStatus {
             order: None,
             nodes: (0, 0),
             last_node: None,
+            spot: None,
+            map: None,
+            heading: None,
             driving: false,
             actions: 0,
             charge: None,
@@ -356,6 +365,10 @@ impl VehicleStatus {
         let base = state.node_states.iter().filter(|node| !node.released.is(false)).count();
         self.nodes = (base, state.node_states.iter().len() - base);
         self.last_node = short(&state.last_node_id).filter(|id| !id.is_empty());
+        let spot = state.spot();
+        self.spot = spot.as_ref().map(|spot| (spot.x, spot.y));
+        self.map = spot.map(|spot| cut(spot.map_id.as_str())).filter(|map| !map.is_empty());
+        self.heading = state.pose().map(|pose| pose.theta);
         self.driving = state.driving.is(true);
         self.actions = open_actions(state).count();
         let battery = state.battery_state.there();

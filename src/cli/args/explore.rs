@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::{DeviceArgs, OutputArgs, SuiteArgs};
+use super::{DeviceArgs, OutputArgs, PageArgs, SuiteArgs};
 
 const EXPLORE_HELP: &str = "\
 Examples:
@@ -27,6 +27,9 @@ pub struct Explore {
     /// Where results go.
     #[command(flatten)]
     pub output: OutputArgs,
+    /// The page for people.
+    #[command(flatten)]
+    pub page: PageArgs,
     /// Which suites, and with them which grammar.
     #[command(flatten)]
     pub suites: SuiteArgs,

@@ -298,6 +298,34 @@ pub struct PeopleArgs {
     /// Let questions be answered over HTTP as well, from this machine only; the address with its token is printed
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "127.0.0.1:0", help_heading = "People")]
     pub questions: Option<String>,
+    /// The page for them.
+    #[command(flatten)]
+    pub page: PageArgs,
+}
+
+/// The page for the people beside the vehicle.
+#[derive(Clone, Debug, Default, Args)]
+pub struct PageArgs {
+    /// Serve a page for the people beside the vehicle, with what is awaited and every prompt; this machine only unless said
+    /// (docs/page.md)
+    #[arg(
+        long = "page",
+        value_name = "ADDRESS",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "127.0.0.1:0",
+        help_heading = "People"
+    )]
+    pub address: Option<String>,
+}
+
+impl PageArgs {
+    /// The flag, if it was given, by the name of the setting of the profile.
+    #[must_use]
+    pub fn settings(&self) -> Vec<(&'static str, String)> {
+        let address = self.address.iter();
+        address.map(|address| ("bench.page", address.clone())).collect()
+    }
 }
 
 /// What a pipeline reads.

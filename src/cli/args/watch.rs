@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::{BrokerArgs, Format, SuiteArgs};
+use super::{BrokerArgs, Format, PageArgs, SuiteArgs};
 
 const WATCH_HELP: &str = "\
 Examples:
@@ -37,6 +37,9 @@ pub struct Watch {
     /// Serve findings, rates and reaction times at /metrics, as OpenMetrics text
     #[arg(long, value_name = "HOST:PORT")]
     pub metrics: Option<String>,
+    /// The page for people.
+    #[command(flatten)]
+    pub page: PageArgs,
     /// Write a journal, which `audit` judges alike; a file that is there is renamed
     #[arg(long, value_name = "FILE", help_heading = "Recording")]
     pub record: Option<PathBuf>,

@@ -7,7 +7,7 @@ mod stage;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::args::Explore;
+use super::args::{Explore, Format};
 use super::device::check_faults;
 use super::exit::Exit;
 use super::problem::Problem;
@@ -30,10 +30,13 @@ const AT_ONCE: usize = 4;
 /// `explore`.
 pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
     let surroundings = Surroundings::of_process();
+    if arguments.in_virtual_time && arguments.page.address.is_some() {
+        return Err(super::page::in_virtual_time());
+    }
     let library = crate::assets::library(arguments.suites.own())?;
     let effective = profile::load(
         arguments.device.profile.as_deref(),
-        &arguments.device.settings(),
+        &[arguments.device.settings(), arguments.page.settings()].concat(),
         &surroundings,
         &library.rules.hooks,
     )?;
@@ -68,10 +71,24 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
         return measure::every_fault(library, &pack, &exploration, every.max(1), arguments);
     }
     let mut stage = OnStage::new(library, pack, device, &arguments.output.out)?;
-    if !arguments.replay.is_empty() {
-        return replay(&arguments.replay, &mut stage);
-    }
-    let explored = exploration.carry_out(&mut stage, &mut |text| eprintln!("{text}"))?;
+    stage.serve_page(&effective)?;
+    let outcome = match arguments.replay.as_slice() {
+        [] => held(&exploration, &mut stage, arguments.output.format),
+        replayed => replay(replayed, &mut stage),
+    };
+    stage.finish(outcome.as_ref().ok());
+    outcome
+}
+
+/// Holds the conversations, and says what came of them.
+fn held(exploration: &Exploration, stage: &mut OnStage, format: Format) -> Result<Exit, Problem> {
+    let page = stage.page();
+    let explored = exploration.carry_out(stage, &mut |text| {
+        eprintln!("{text}");
+        if let Some(page) = &page {
+            page.note(text);
+        }
+    })?;
     let place = show::Place {
         report: stage.report(),
         conversations: &stage.conversations(&explored)?,
@@ -79,10 +96,10 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
     };
     super::print(&show::explored(
         &explored,
-        &exploration,
+        exploration,
         stage.catalogue(),
         place,
-        arguments.output.format,
+        format,
     )?)?;
     let fails = explored.findings.iter().any(Shown::fails);
     // There was no time to see whether it shows again.

@@ -10,6 +10,8 @@ use tokio::sync::watch;
 use crate::cli::args::Explore;
 use crate::cli::device::tolerate;
 use crate::cli::ending::stop;
+use crate::cli::exit::Exit;
+use crate::cli::page::{self, OnPage, ServedPage};
 use crate::cli::problem::Problem;
 use crate::cli::run::{hold, person};
 use crate::ui::Prompter;
@@ -22,11 +24,12 @@ use tck_journal::file::JournalWriter;
 use tck_judge::Library;
 use tck_judge::RunJudge;
 use tck_pack::{Catalogue, Pack, Participant, Role};
+use tck_page::{Facts, Outcome, Page};
 use tck_profile::{Effective, Surroundings};
 use tck_report::junit::Inconclusive;
 use tck_run::{
-    Bundle, Finished, LiveRun, ProfileContext, Request, Selection, Silent, VirtualRun, run_virtually, sources,
-    write_all,
+    Bundle, Finished, LiveRun, ProfileContext, Progress, Request, Selection, Silent, VirtualRun, run_virtually,
+    sources, write_all,
 };
 use tck_simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
 use tck_suite::model::Test;
@@ -111,6 +114,8 @@ pub(super) struct OnStage {
     /// When the exploration began.
     begun: Instant,
     desk: Prompter,
+    /// The page for people elsewhere, where there is one.
+    served: Option<ServedPage>,
     rounds: u32,
     kept: Option<PathBuf>,
     /// The report whose tests are the conversations of the findings.
@@ -133,11 +138,61 @@ impl OnStage {
             runtime,
             interrupt: stop.subscribe(),
             desk: Prompter::new(stop),
+            served: None,
             begun: Instant::now(),
             rounds: 0,
             kept: None,
             evidence: None,
         })
+    }
+
+    /// Serves a page where the profile says so; a device in virtual time has none.
+    pub(super) fn serve_page(&mut self, effective: &Effective) -> Result<(), Problem> {
+        if matches!(self.device, Device::Virtual { .. }) {
+            return Ok(());
+        }
+        let served = ServedPage::start(effective, &self.desk, self.interrupt.clone());
+        self.served = self.runtime.block_on(served)?;
+        let Some(page) = self.page() else { return Ok(()) };
+        self.desk.is_followed_by(page::follower(page.clone()));
+        let subject = self.subject();
+        page.begun(Facts {
+            command: "explore".to_owned(),
+            role: subject.role.word().to_owned(),
+            protocol: self.pack.version.to_string(),
+            manufacturer: subject.manufacturer,
+            serial_number: subject.serial_number,
+            run: String::new(),
+            broker: page::broker(effective),
+        });
+        Ok(())
+    }
+
+    /// What the page shows, where there is one.
+    pub(super) fn page(&self) -> Option<Page> {
+        self.served.as_ref().map(|served| served.page.clone())
+    }
+
+    /// The page says how it ended, and is served no more.
+    pub(super) fn finish(&mut self, exit: Option<&Exit>) {
+        let Some(served) = self.served.take() else { return };
+        if let Some(exit) = exit {
+            let verdict = match exit {
+                Exit::Conforms => "pass",
+                Exit::DoesNotConform => "fail",
+                Exit::Undecided => "inconclusive",
+                _ => "none",
+            };
+            served.page.ended(Outcome {
+                verdict: verdict.to_owned(),
+                statement: "The exploration is over; the terminal says what was found.".to_owned(),
+                report: self
+                    .kept
+                    .as_ref()
+                    .map_or_else(|| "none".to_owned(), |folder| folder.display().to_string()),
+            });
+        }
+        self.runtime.block_on(served.finish());
     }
 
     pub(super) fn catalogue(&self) -> &Catalogue {
@@ -243,7 +298,7 @@ impl OnStage {
                 let place = ProfileContext {
                     profile: None,
                     folder: folder.clone(),
-                    person: person(&self.desk, false),
+                    person: person(&self.desk, self.served.is_some()),
                     vehicles: None,
                 };
                 let mut run = LiveRun::of_profile(effective, library, pack, surroundings, place)?;
@@ -266,8 +321,21 @@ impl OnStage {
         run.request = request;
         run.hold = hold(&self.desk);
         let pack = &self.pack;
-        let (mut nobody, mut nowhere) = (Silent, |_: &RunJudge| {});
-        let run = run.carry_out(library, pack, writer, interrupt, &mut nobody, &mut nowhere);
+        run.stopped_at = self.desk.stopped_at();
+        let mut nowhere = |_: &RunJudge| {};
+        let mut onlooker: Box<dyn Progress> = match self.page() {
+            None => Box::new(Silent),
+            Some(page) => {
+                let role = run.device.subject.role;
+                page.begins_anew();
+                run.onlooker = Some(page::onlooker(page.clone(), role, Arc::clone(pack)));
+                if let Some(layout) = run.device.layout.as_ref().filter(|_| role == Role::Agv) {
+                    page.floor(page::floor(layout));
+                }
+                Box::new(OnPage(page))
+            }
+        };
+        let run = run.carry_out(library, pack, writer, interrupt, &mut *onlooker, &mut nowhere);
         self.runtime.block_on(run).map_err(environment)
     }
 

@@ -2,15 +2,16 @@
 
 mod conclude;
 mod resume;
+mod saving;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
 use resume::{AboutRun, Earlier};
+use saving::saving;
 
 use super::args;
 use super::device::{check_faults, tolerate};
@@ -18,6 +19,7 @@ use super::ending::Ending;
 use super::events::{About, Followed};
 use super::exit::Exit;
 use super::outputs::Outputs;
+use super::page::{self, ServedPage};
 use super::problem::Problem;
 use super::reference::{self, Asked};
 use super::screen::{Screen, Show};
@@ -28,24 +30,26 @@ use tck_base::secrets::Secrets;
 use tck_journal::file::JournalWriter;
 use tck_journal::{Reason, Vantage};
 use tck_judge::Library;
-use tck_judge::RunJudge;
 use tck_net::bench::LinkError;
 use tck_net::bench::endpoint::Access;
 use tck_net::bench::tls::TlsFiles;
 use tck_net::link::mqtt::BrokerChoice;
 use tck_pack::Participant;
 use tck_pack::{Pack, Role};
+use tck_page::Page;
 use tck_profile::{self as profile, Effective, Surroundings};
 use tck_report::statement::many;
 use tck_run::{
     Answering, AnsweringError, Bundle, Criteria, Hold, LATEST, LiveRun, Person, ProfileContext, Request,
-    RequestBuilder, RunError, RunPlan, VirtualRun, going_on_at, pack_of, run_virtually, write_result,
+    RequestBuilder, RunError, RunPlan, VirtualRun, going_on_at, pack_of, run_virtually,
 };
 use tck_simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
 
 /// What `run` and `certify` have in common.
 struct Job {
     desk: Prompter,
+    /// The page for people elsewhere, where there is one.
+    page: Option<Page>,
     library: Library,
     pack: Arc<Pack>,
     effective: Effective,
@@ -64,10 +68,18 @@ struct Job {
 /// `run`.
 pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit, Problem> {
     let surroundings = Surroundings::of_process();
+    if arguments.in_virtual_time && arguments.people.page.address.is_some() {
+        return Err(page::in_virtual_time());
+    }
     let library = crate::assets::library(arguments.suites.own())?;
     let effective = profile::load(
         arguments.device.profile.as_deref(),
-        &[arguments.device.settings(), arguments.said.clone()].concat(),
+        &[
+            arguments.device.settings(),
+            arguments.people.page.settings(),
+            arguments.said.clone(),
+        ]
+        .concat(),
         &surroundings,
         &library.rules.hooks,
     )?;
@@ -95,6 +107,7 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
     check_faults(role, &arguments.fault)?;
     let mut job = Job {
         desk: Prompter::new(watch::channel(false).0),
+        page: None,
         request,
         library,
         pack,
@@ -126,6 +139,7 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
         .build();
     let runtime = runtime.map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
     let mut desk = job.desk.clone();
+    let mut served = None;
     let outcome = runtime.block_on(async {
         let ending = Ending::listen()?;
         let interrupt = ending.interrupt.clone();
@@ -139,6 +153,10 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
         if let Some(answering) = &answering {
             eprintln!("questions are answered at {} (docs/events.md)", answering.url());
         }
+        if !arguments.in_virtual_time {
+            served = ServedPage::start(&job.effective, &desk, interrupt.clone()).await?;
+            job.page = served.as_ref().map(|served| served.page.clone());
+        }
         if arguments.in_virtual_time {
             job.virtually(arguments, interrupt, outputs).await
         } else if built_in {
@@ -147,6 +165,9 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
             job.device(arguments, interrupt, &surroundings, outputs).await
         }
     });
+    if let Some(served) = served {
+        runtime.block_on(served.finish());
+    }
     // Sockets of a silent peer must not keep the process from ending.
     runtime.shutdown_background();
     desk.at_rest();
@@ -260,7 +281,10 @@ impl Job {
             folder: profile
                 .and_then(Path::parent)
                 .map_or_else(PathBuf::new, Path::to_path_buf),
-            person: person(&self.desk, arguments.people.questions.is_some()),
+            person: person(
+                &self.desk,
+                arguments.people.questions.is_some() || self.effective.profile.bench.page.is_some(),
+            ),
             vehicles: self.vehicles,
         };
         let mut run = LiveRun::of_profile(&self.effective, &self.library, &self.pack, surroundings, place)?;
@@ -305,7 +329,7 @@ impl Job {
         if self.no_motion {
             run.motion = Err(Reason::MotionRuledOut);
         }
-        let mut saved = saving(&bundle);
+        let mut saved = saving(&bundle, None);
         let finished = run_virtually(
             &self.library,
             &self.pack,
@@ -405,8 +429,16 @@ impl Job {
         run.device_log = Some(bundle.folder().join("device.log"));
         run.hold = hold(&self.desk);
         run.quit.clone_from(&self.quit);
+        run.stopped_at = self.desk.stopped_at();
+        if let Some(page) = &self.page {
+            let role = run.device.subject.role;
+            run.onlooker = Some(page::onlooker(page.clone(), role, Arc::clone(&self.pack)));
+            if let Some(layout) = run.device.layout.as_ref().filter(|_| role == Role::Agv) {
+                page.floor(page::floor(layout));
+            }
+        }
         let mut terminal = self.screen(&run.device.subject, &bundle)?;
-        let mut saved = saving(&bundle);
+        let mut saved = saving(&bundle, self.page.clone());
         let finished = run.carry_out(
             &self.library,
             &self.pack,
@@ -496,7 +528,7 @@ impl Job {
         } else {
             screen
         };
-        let mut followed = Followed::new(screen, self.output.events.as_deref())?;
+        let mut followed = Followed::new(screen, self.output.events.as_deref(), self.page.clone())?;
         if let Some(follower) = followed.follower() {
             self.desk.is_followed_by(follower);
         }
@@ -507,6 +539,8 @@ impl Job {
             manufacturer: &device.manufacturer,
             serial_number: &device.serial_number,
             bundle: bundle.folder(),
+            command: mode(self.certifies).unwrap_or("run"),
+            broker: &page::broker(&self.effective),
         });
         Ok(followed)
     }
@@ -541,19 +575,4 @@ fn without_secrets(mut complaint: Diagnostic) -> Diagnostic {
 
 fn environment(error: impl std::fmt::Display) -> Problem {
     Problem::Environment(error.to_string())
-}
-
-/// How long a result on the disk may be behind the journal. Written after every test, the results of a long run cost more
-/// than the run; what a crash leaves is complete in the journal, and `report` reads it from there.
-const SAVED_EVERY: Duration = Duration::from_secs(5);
-
-/// Keeps `result.json` on the disk while a run goes on.
-fn saving(bundle: &Bundle) -> impl FnMut(&RunJudge) + '_ {
-    let mut last: Option<Instant> = None;
-    move |judge| {
-        if last.is_none_or(|last| last.elapsed() >= SAVED_EVERY) {
-            last = Some(Instant::now());
-            drop(write_result(bundle, &judge.result()));
-        }
-    }
 }

@@ -36,8 +36,8 @@ pub(super) struct Earlier {
 pub(super) const ONE_THING: &str =
     "give the flags and the profile of that run, for the same device; what is joined has to be about one thing";
 
-/// Where the device connects may change.
-const WHERE: &str = "bench.listen";
+/// Where the device and people connect may change.
+const WHERE: [&str; 2] = ["bench.listen", "bench.page"];
 
 /// What a run is about, beside its suites.
 pub(super) struct AboutRun<'a> {
@@ -177,6 +177,6 @@ fn setting<'a>(before: &'a [Setting], now: &'a [Setting]) -> Option<(&'a str, Op
     let mut names = before.iter().chain(now).map(|setting| setting.name.as_str());
     names.find_map(|name| {
         let (before, now) = (value(before, name), value(now, name));
-        (before != now && name != WHERE).then_some((name, before, now))
+        (before != now && !WHERE.contains(&name)).then_some((name, before, now))
     })
 }

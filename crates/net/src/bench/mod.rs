@@ -11,6 +11,7 @@ pub mod leavings;
 pub mod listen;
 pub mod own;
 pub mod patience;
+pub mod secret;
 pub mod secure;
 pub mod stream;
 pub mod tls;

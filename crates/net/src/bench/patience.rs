@@ -9,9 +9,13 @@ use std::time::Duration;
 
 use axum::serve::Listener;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::net::TcpListener;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
+use tokio::task::JoinHandle;
 use tokio::time::Sleep;
+
+use super::secure::TlsServer;
+use super::stream::Stream;
 
 /// How long the head of the first request of a connection may take.
 const HEAD_LIMIT: Duration = Duration::from_secs(10);
@@ -50,13 +54,7 @@ impl Listener for PatientListener {
             };
             match self.listener.accept().await {
                 Ok((stream, peer)) => {
-                    let connection = HttpConnection {
-                        stream,
-                        head: Head::default(),
-                        limit: Box::pin(tokio::time::sleep(self.limit)),
-                        _place: place,
-                    };
-                    return (connection, peer);
+                    return (HttpConnection::begin(Box::new(stream), self.limit, place), peer);
                 }
                 Err(_) => tokio::time::sleep(NO_HANDLE).await,
             }
@@ -68,13 +66,83 @@ impl Listener for PatientListener {
     }
 }
 
+/// A port that serves HTTP over TLS to few clients at a time. One that is slow to shake hands keeps nobody else waiting.
+pub struct SecuredListener {
+    address: io::Result<SocketAddr>,
+    secured: mpsc::Receiver<(HttpConnection, SocketAddr)>,
+    accepting: JoinHandle<()>,
+}
+
+impl SecuredListener {
+    /// Serves on a port that is open already, and shows a certificate there.
+    #[must_use]
+    pub fn new(listener: TcpListener, tls: TlsServer) -> Self {
+        let address = listener.local_addr();
+        let (sender, secured) = mpsc::channel(1);
+        let places = Arc::new(Semaphore::new(CONNECTIONS));
+        let accepting = tokio::spawn(async move {
+            while let Ok(place) = Arc::clone(&places).acquire_owned().await {
+                let Ok((stream, peer)) = listener.accept().await else {
+                    tokio::time::sleep(NO_HANDLE).await;
+                    continue;
+                };
+                let (tls, sender) = (tls.clone(), sender.clone());
+                tokio::spawn(async move {
+                    if let Ok(Ok(stream)) = tokio::time::timeout(HEAD_LIMIT, tls.accept(stream)).await {
+                        let connection = HttpConnection::begin(Box::new(stream), HEAD_LIMIT, place);
+                        let _ = sender.send((connection, peer)).await;
+                    }
+                });
+            }
+        });
+        Self {
+            address,
+            secured,
+            accepting,
+        }
+    }
+}
+
+impl Drop for SecuredListener {
+    fn drop(&mut self) {
+        self.accepting.abort();
+    }
+}
+
+impl Listener for SecuredListener {
+    type Io = HttpConnection;
+    type Addr = SocketAddr;
+
+    async fn accept(&mut self) -> (Self::Io, Self::Addr) {
+        match self.secured.recv().await {
+            Some(secured) => secured,
+            None => std::future::pending().await,
+        }
+    }
+
+    fn local_addr(&self) -> io::Result<Self::Addr> {
+        self.address.as_ref().copied().map_err(|error| error.kind().into())
+    }
+}
+
 /// A connection of a client, which ends when the head of its first request does not come.
 pub struct HttpConnection {
-    stream: TcpStream,
+    stream: Box<dyn Stream>,
     head: Head,
     limit: Pin<Box<Sleep>>,
     /// The place it takes until it is dropped.
     _place: OwnedSemaphorePermit,
+}
+
+impl HttpConnection {
+    fn begin(stream: Box<dyn Stream>, limit: Duration, place: OwnedSemaphorePermit) -> Self {
+        Self {
+            stream,
+            head: Head::default(),
+            limit: Box::pin(tokio::time::sleep(limit)),
+            _place: place,
+        }
+    }
 }
 
 /// How much of the end of a head was seen.
@@ -138,6 +206,7 @@ mod tests {
     use axum::Router;
     use axum::routing::get;
     use tokio::io::{AsyncReadExt, AsyncWriteExt};
+    use tokio::net::TcpStream;
 
     use super::*;
 

@@ -57,7 +57,10 @@ impl TlsClient {
 
 impl TlsServer {
     /// Shows this certificate.
-    pub(crate) fn new(files: &TlsFiles) -> Result<Self, LinkError> {
+    ///
+    /// # Errors
+    /// [`LinkError::Setup`] when certificate or key cannot be read, or do not belong together.
+    pub fn new(files: &TlsFiles) -> Result<Self, LinkError> {
         server(files).map(|config| Self(config.into()))
     }
 
