@@ -79,6 +79,9 @@ pub use tck_engine as engine;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub use tck_explore as explore;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub use tck_history as history;
 #[doc(hidden)]
 pub use tck_journal as journal;
 #[doc(hidden)]

@@ -15,6 +15,7 @@ mod explore;
 mod export;
 mod follow;
 mod gate;
+mod history;
 mod language;
 mod list;
 mod log;
@@ -101,6 +102,7 @@ fn dispatch(cli: &Cli, outputs: &outputs::Outputs<'_>) -> Result<Exit, Problem> 
         Command::Validate(arguments) => validate::validate(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Report(arguments) => report::report(arguments, outputs),
+        Command::History(arguments) => history::history(arguments),
         Command::Qualify(arguments) => qualify::qualify(arguments),
         Command::Discover(arguments) => discover::discover(arguments),
         Command::Init(arguments) => discover::init(arguments),

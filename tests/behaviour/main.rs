@@ -16,6 +16,7 @@ mod exit_codes;
 mod exploring;
 mod following;
 mod handed_over;
+mod histories;
 mod hooks;
 mod hostile;
 mod https;
