@@ -3,6 +3,7 @@
 pub mod args;
 mod audit;
 mod audited;
+mod baseline;
 mod browser;
 mod certify;
 mod device;
