@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 /// Rooms by layer; an arrow may point to the same layer or down, never up, and there are no circles on one layer. A room
 /// is a crate below `crates/`, a folder of the two crates that hold several (`base` and `net`), or a folder of the program.
-const LAYERS: [(&str, u8); 43] = [
+const LAYERS: [(&str, u8); 44] = [
     ("main", 6),
     ("cli", 6),
     ("ui", 6),
@@ -20,6 +20,7 @@ const LAYERS: [(&str, u8); 43] = [
     ("run", 5),
     ("qualify", 5),
     ("audit", 5),
+    ("campaign", 5),
     ("history", 5),
     ("watch", 5),
     ("simulate", 5),

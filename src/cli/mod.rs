@@ -5,6 +5,7 @@ mod audit;
 mod audited;
 mod baseline;
 mod browser;
+mod campaign;
 mod certify;
 mod device;
 mod discover;
@@ -103,6 +104,7 @@ fn dispatch(cli: &Cli, outputs: &outputs::Outputs<'_>) -> Result<Exit, Problem> 
         Command::Validate(arguments) => validate::validate(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Report(arguments) => report::report(arguments, outputs),
+        Command::Campaign(arguments) => campaign::campaign(arguments),
         Command::History(arguments) => history::history(arguments),
         Command::Qualify(arguments) => qualify::qualify(arguments),
         Command::Discover(arguments) => discover::discover(arguments),

@@ -10,6 +10,7 @@ mod bench;
 mod broken;
 mod brokers;
 mod bystanders;
+mod campaigns;
 mod certificates;
 mod discovering;
 mod exit_codes;

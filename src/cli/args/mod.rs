@@ -4,6 +4,7 @@
 //! they stand, so that a value means the same on the command line, in the environment and in a file.
 
 mod audit;
+mod campaign;
 mod discover;
 mod explore;
 mod history;
@@ -26,6 +27,7 @@ use crate::assets::Own;
 use tck_report::junit::Inconclusive;
 
 pub use audit::Audit;
+pub use campaign::Campaign;
 pub use discover::{BrokerArgs, Discover, Init, ListenArgs};
 pub use explore::Explore;
 pub use history::{History, HistoryKind, HistoryTo};
@@ -96,6 +98,8 @@ pub enum Command {
     Simulate(Simulate),
     /// Render the report of a finished run again, verify it, judge it again, or compare two
     Report(Report),
+    /// Test many devices or versions with many suites, each pair in a run of its own; goes on where it was
+    Campaign(Campaign),
     /// Show over many runs which requirement fails since when, what is flaky or fixed, and what changed between
     History(History),
     /// Self-test: the reference devices pass everything, and every check is failed by a fault
@@ -131,6 +135,7 @@ impl Command {
             Self::List(arguments) => arguments.format,
             Self::Validate(arguments) => arguments.format,
             Self::Report(arguments) => arguments.format,
+            Self::Campaign(arguments) => arguments.format,
             Self::History(arguments) => arguments.format,
             Self::Qualify(arguments) => arguments.format,
             Self::Discover(arguments) => arguments.format,
