@@ -65,6 +65,9 @@ pub use tck_run::{Criteria, Request, RequestBuilder, Selection};
 pub use tck_audit as audit;
 #[doc(hidden)]
 pub use tck_base::{clock, device, diagnostic, nurbs, pattern, secrets, verdict, yaml};
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub use tck_campaign as campaign;
 #[cfg(feature = "captures")]
 #[doc(hidden)]
 pub use tck_capture as capture;
@@ -79,6 +82,9 @@ pub use tck_engine as engine;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub use tck_explore as explore;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub use tck_history as history;
 #[doc(hidden)]
 pub use tck_journal as journal;
 #[doc(hidden)]

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 /// Rooms by layer; an arrow may point to the same layer or down, never up, and there are no circles on one layer. A room
 /// is a crate below `crates/`, a folder of the two crates that hold several (`base` and `net`), or a folder of the program.
-const LAYERS: [(&str, u8); 43] = [
+const LAYERS: [(&str, u8); 45] = [
     ("main", 6),
     ("cli", 6),
     ("ui", 6),
@@ -20,6 +20,8 @@ const LAYERS: [(&str, u8); 43] = [
     ("run", 5),
     ("qualify", 5),
     ("audit", 5),
+    ("campaign", 5),
+    ("history", 5),
     ("watch", 5),
     ("simulate", 5),
     ("report", 5),
@@ -503,8 +505,8 @@ fn looked_for(line: &str) -> impl Iterator<Item = &str> {
 }
 
 /// The rooms that make, carry and show results. Elsewhere the sentences of libraries are read that give no type.
-const ROOMS_OF_RESULTS: [&str; 9] = [
-    "run", "judge", "result", "report", "audit", "watch", "explore", "cli", "ui",
+const ROOMS_OF_RESULTS: [&str; 10] = [
+    "run", "judge", "result", "report", "audit", "history", "watch", "explore", "cli", "ui",
 ];
 
 #[test]

@@ -29,6 +29,7 @@ pub fn audit(arguments: &Arguments) -> Result<Exit, Problem> {
     if arguments.follow {
         return super::follow::follow(arguments, &library, options);
     }
+    let baseline = arguments.baseline.as_deref().map(super::baseline::read).transpose()?;
     let not_written = |error: std::io::Error| Problem::Environment(format!("cannot write the tables: {error}"));
     let mut runs = Vec::new();
     let mut export = match &arguments.export {
@@ -46,6 +47,7 @@ pub fn audit(arguments: &Arguments) -> Result<Exit, Problem> {
     })?;
     result.vehicles.extend(runs);
     result.conclude();
+    let against = baseline.map(|baseline| baseline.hold(&result)).transpose()?;
     if let Some(export) = export {
         export.finish(&result).map_err(not_written)?;
     }
@@ -60,7 +62,10 @@ pub fn audit(arguments: &Arguments) -> Result<Exit, Problem> {
     if let Some(wanted) = &arguments.slice {
         return super::slice::slice(arguments, &library, &options, &result, wanted);
     }
-    show(&result, arguments.format)
+    match against {
+        Some(against) => super::baseline::show(&result, &against, arguments.format),
+        None => show(&result, arguments.format),
+    }
 }
 
 /// Reads all recordings. The journals of runs are judged by themselves, the rest is shown to `passing` and handed out.

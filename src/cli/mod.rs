@@ -3,7 +3,9 @@
 pub mod args;
 mod audit;
 mod audited;
+mod baseline;
 mod browser;
+mod campaign;
 mod certify;
 mod device;
 mod discover;
@@ -16,6 +18,7 @@ mod export;
 mod follow;
 mod gate;
 mod impaired;
+mod history;
 mod language;
 mod list;
 mod log;
@@ -104,6 +107,8 @@ fn dispatch(cli: &Cli, outputs: &outputs::Outputs<'_>) -> Result<Exit, Problem> 
         Command::Validate(arguments) => validate::validate(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Report(arguments) => report::report(arguments, outputs),
+        Command::Campaign(arguments) => campaign::campaign(arguments),
+        Command::History(arguments) => history::history(arguments),
         Command::Qualify(arguments) => qualify::qualify(arguments),
         Command::Discover(arguments) => discover::discover(arguments),
         Command::Init(arguments) => discover::init(arguments),

@@ -368,3 +368,68 @@ fn a_recording_that_grows_is_followed() {
     following.interrupt();
     following.end().code(1).prints("1 vehicle;");
 }
+
+#[test]
+fn what_a_baseline_has_is_no_news_and_what_is_gone_is_said() {
+    let bench = Bench::new();
+    let (bad, good) = (capture("horizon-missing.jsonl"), capture("two-versions.jsonl"));
+    bench.run(&["audit", &bad, "--out", "monday"]).code(1);
+    bench
+        .run(&["audit", &bad, "--baseline", "monday"])
+        .code(0)
+        .prints("against the baseline monday: 0 new, ");
+    // The verdict stays, and the bundle is that of the recording alone.
+    let told = bench
+        .run(&[
+            "audit",
+            &bad,
+            "--baseline",
+            "monday",
+            "--out",
+            "tuesday",
+            "--format",
+            "json",
+        ])
+        .code(0);
+    let told = result(&told);
+    assert_eq!(
+        (&told["verdict"], &told["against"]["rest"]),
+        (&Value::from("fail"), &Value::from("pass"))
+    );
+    let again: Value = serde_json::from_slice(&fs::read(bench.path().join("tuesday/result.json")).unwrap()).unwrap();
+    assert!(again.get("against").is_none() && again["verdict"] == "fail");
+    // Without the finding in the baseline it is new; a result alone is a baseline, too.
+    let mut before: Value =
+        serde_json::from_slice(&fs::read(bench.path().join("monday/result.json")).unwrap()).unwrap();
+    for vehicle in before["vehicles"].as_array_mut().unwrap() {
+        for side in vehicle["sides"].as_array_mut().unwrap() {
+            side["findings"] = Value::Array(Vec::new());
+        }
+    }
+    fs::write(bench.path().join("clean.json"), before.to_string()).unwrap();
+    bench
+        .run(&["audit", &bad, "--baseline", "clean.json"])
+        .code(1)
+        .prints("NEW   fail")
+        .prints("it has no manifest");
+    // Others are refused, as is a bundle that was changed, and what is no audit.
+    bench
+        .run(&["audit", &good, "--baseline", "monday"])
+        .code(2)
+        .says("the baseline is about");
+    fs::write(bench.path().join("monday/junit.xml"), "").unwrap();
+    bench
+        .run(&["audit", &bad, "--baseline", "monday"])
+        .code(2)
+        .says("not what its manifest says");
+    bench
+        .run(&["audit", &bad, "--baseline", "nowhere"])
+        .code(2)
+        .says("nowhere is not there");
+    fs::write(bench.path().join("other.json"), "{}").unwrap();
+    bench
+        .run(&["audit", &bad, "--baseline", "other.json"])
+        .code(2)
+        .says("no result of an audit");
+    bench.run(&["audit", &bad, "--baseline", "tuesday", "--follow"]).code(2);
+}

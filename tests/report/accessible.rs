@@ -3,8 +3,10 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use vda5050_tck::report::{certificate, html, side_by_side};
-use vda5050_tck::result::{CommandedVehicle, FleetResult, ReactionTimes};
+use vda5050_tck::history::{gather, page};
+use vda5050_tck::report::manifest::Manifest;
+use vda5050_tck::report::{certificate, html, json, side_by_side};
+use vda5050_tck::result::{CommandedVehicle, FleetResult, ReactionTimes, RunResult};
 
 use crate::certificate::{ROOT, certified};
 use crate::samples;
@@ -35,6 +37,32 @@ fn fleet() -> String {
         each: vec![vehicle("0001", 3, Some(4.0)), vehicle("0002", 0, None)],
     });
     html::render(&result, &samples::sources(), Some(&journal)).expect("html")
+}
+
+/// The history of these runs, a day between each, and of a bundle that is damaged.
+fn history(runs: &[RunResult]) -> String {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (at, run) in runs.iter().enumerate() {
+        let mut run = run.clone();
+        run.started = format!("2026-01-0{}T08:00:00.000Z", at + 1);
+        let bundle = folder.path().join(at.to_string());
+        std::fs::create_dir(&bundle).expect("a folder");
+        std::fs::write(bundle.join("report.html"), "").expect("a page");
+        json::write(&bundle.join("result.json"), &run).expect("a result");
+        Manifest::write(&bundle).expect("a manifest");
+    }
+    let damaged = folder.path().join("damaged");
+    std::fs::create_dir(&damaged).expect("a folder");
+    std::fs::write(damaged.join("result.json"), "{}").expect("a result");
+    Manifest::write(&damaged).expect("a manifest");
+    std::fs::write(damaged.join("result.json"), "[]").expect("a result");
+    let history = gather(folder.path()).expect("a history");
+    assert_eq!((history.bundles, history.left_out.len()), (runs.len(), 1));
+    let sources = runs
+        .iter()
+        .map(|run| (run.protocol.clone(), samples::sources()))
+        .collect();
+    page::render(&history, &sources, "").expect("a page")
 }
 
 #[test]
@@ -72,6 +100,7 @@ fn axe_finds_nothing_in_any_page() {
             "comparison",
             side_by_side::render(&runs, &names, &sources).expect("a page"),
         ),
+        ("history", history(&runs)),
     ];
     let folder = tempfile::tempdir().expect("a folder");
     let mut files = Vec::new();

@@ -8,6 +8,7 @@
 #![warn(missing_docs)]
 
 mod arrived;
+pub mod baseline;
 pub mod bundle;
 mod continuity;
 mod conversation;

@@ -13,6 +13,7 @@ Examples:
   vda5050-tck audit monday.jsonl.gz tuesday.jsonl.zst        as one stream, ordered by time
   vda5050-tck audit site.pcap                                network traffic: QoS, last will and the like are judged, too
   vda5050-tck audit site.jsonl --slice STATE-12 > bug.jsonl  as few messages as still show a finding
+  vda5050-tck audit tuesday.jsonl --baseline audits/monday   red only for what was not there on Monday
   vda5050-tck audit log.jsonl --time ts --topic t --payload p
 
 What a recording cannot show is not judged: it may begin in the middle or lack messages.";
@@ -54,6 +55,9 @@ pub struct Audit {
     /// Write result.json, junit.xml, report.html and manifest.json into this folder, for `report --verify`, `--compare` and `--as`
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Hold it against the bundle of an earlier audit, or its result.json: exit code 1 only for what is new; what is gone is said
+    #[arg(long, value_name = "BUNDLE|FILE", conflicts_with_all = ["follow", "slice"])]
+    pub baseline: Option<PathBuf>,
     /// Write messages and findings as Parquet into this folder: a table for each topic, and one of findings
     #[arg(long, value_name = "DIR")]
     pub export: Option<PathBuf>,

@@ -4,8 +4,10 @@
 //! they stand, so that a value means the same on the command line, in the environment and in a file.
 
 mod audit;
+mod campaign;
 mod discover;
 mod explore;
+mod history;
 mod inspect;
 mod rendering;
 mod run;
@@ -25,8 +27,10 @@ use crate::assets::Own;
 use tck_report::junit::Inconclusive;
 
 pub use audit::Audit;
+pub use campaign::Campaign;
 pub use discover::{BrokerArgs, Discover, Init, ListenArgs};
 pub use explore::Explore;
+pub use history::{History, HistoryKind, HistoryTo};
 pub use inspect::{Explain, List, Listing, Report, Validate};
 pub(super) use rendering::to_file;
 pub use rendering::{RenderedTo, Rendering};
@@ -94,6 +98,10 @@ pub enum Command {
     Simulate(Simulate),
     /// Render the report of a finished run again, verify it, judge it again, or compare two
     Report(Report),
+    /// Test many devices or versions with many suites, each pair in a run of its own; goes on where it was
+    Campaign(Campaign),
+    /// Show over many runs which requirement fails since when, what is flaky or fixed, and what changed between
+    History(History),
     /// Self-test: the reference devices pass everything, and every check is failed by a fault
     Qualify(Qualify),
     /// Show who speaks on a broker; nothing is sent
@@ -127,6 +135,8 @@ impl Command {
             Self::List(arguments) => arguments.format,
             Self::Validate(arguments) => arguments.format,
             Self::Report(arguments) => arguments.format,
+            Self::Campaign(arguments) => arguments.format,
+            Self::History(arguments) => arguments.format,
             Self::Qualify(arguments) => arguments.format,
             Self::Discover(arguments) => arguments.format,
             Self::Audit(arguments) => arguments.format,
