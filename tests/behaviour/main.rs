@@ -35,6 +35,7 @@ mod repeatable;
 mod resuming;
 mod scripted;
 mod selecting;
+mod sharing;
 mod simulating;
 mod started;
 mod tool;

@@ -215,7 +215,7 @@ impl Scheduler {
                 (None, None) => Err(format!("{name} does not say of how many")),
             }
         };
-        let parts = || -> Result<(u64, u64), String> {
+        let mut parts = || -> Result<(u64, u64), String> {
             let index: u64 = index.parse().map_err(|_| format!("{} is no number", self.index))?;
             let (first, step) = match self.numbering {
                 Numbering::FromZero => (0, 1),
@@ -237,7 +237,6 @@ impl Scheduler {
             let place = place.ok_or_else(|| "the numbers of the array are not evenly spaced".to_owned())?;
             Ok((place, count))
         };
-        let mut parts = parts;
         let (place, count) = parts().map_err(|why| unclear(&found, why))?;
         let small = |number: u64| usize::try_from(number).unwrap_or(usize::MAX);
         let Some(shard) = Shard::new(small(place), small(count)) else {
