@@ -64,7 +64,7 @@ pub use tck_run::{Criteria, Request, RequestBuilder, Selection};
 #[doc(hidden)]
 pub use tck_audit as audit;
 #[doc(hidden)]
-pub use tck_base::{clock, device, diagnostic, nurbs, pattern, secrets, verdict, yaml};
+pub use tck_base::{clock, device, diagnostic, nurbs, pattern, secrets, shard, verdict, yaml};
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub use tck_campaign as campaign;

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 /// Rooms by layer; an arrow may point to the same layer or down, never up, and there are no circles on one layer. A room
 /// is a crate below `crates/`, a folder of the two crates that hold several (`base` and `net`), or a folder of the program.
-const LAYERS: [(&str, u8); 45] = [
+const LAYERS: [(&str, u8); 46] = [
     ("main", 6),
     ("cli", 6),
     ("ui", 6),
@@ -54,13 +54,14 @@ const LAYERS: [(&str, u8); 45] = [
     ("nurbs", 0),
     ("pattern", 0),
     ("secrets", 0),
+    ("shard", 0),
     ("view", 0),
     ("time", 0),
     ("lib", 7),
 ];
 
 /// The rooms that share a crate with others: of the crates of several rooms and of the program.
-const HELD_TOGETHER: [&str; 20] = [
+const HELD_TOGETHER: [&str; 21] = [
     "main",
     "facade",
     "cli",
@@ -78,6 +79,7 @@ const HELD_TOGETHER: [&str; 20] = [
     "nurbs",
     "pattern",
     "secrets",
+    "shard",
     "time",
     "verdict",
     "yaml",

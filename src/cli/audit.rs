@@ -11,20 +11,28 @@ use tck_audit::pool::{self, WorkerPool};
 use tck_audit::result::{Recording, VehicleResult};
 use tck_audit::{AuditError, Options, bundle, own_run};
 use tck_base::diagnostic::Diagnostic;
+use tck_base::shard::ChosenShard;
 use tck_capture::merge::Merged;
 use tck_capture::{CaptureError, Item, Message, Told};
 use tck_journal::Record;
-use tck_journal::event::Event;
+use tck_journal::event::{Event, ShardRecord};
 use tck_judge::Library;
+use tck_profile::Surroundings;
 
 /// `audit`.
 pub fn audit(arguments: &Arguments) -> Result<Exit, Problem> {
+    // Each finding of a file that grows is told at once, by one process; and a slice is about one finding.
+    let part = match arguments.follow || arguments.slice.is_some() {
+        true => None,
+        false => super::shard::chosen(arguments.shard, &Surroundings::of_process())?,
+    };
     let library = crate::assets::library(arguments.suites.own())?;
     let options = Options {
         topic_template: arguments.topic_template.clone(),
         vehicles: arguments.vehicle.clone(),
         only: arguments.only.clone(),
         protocol: arguments.protocol.clone(),
+        shard: part.as_ref().map(|part| part.shard),
     };
     if arguments.follow {
         return super::follow::follow(arguments, &library, options);
@@ -46,6 +54,7 @@ pub fn audit(arguments: &Arguments) -> Result<Exit, Problem> {
         })
     })?;
     result.vehicles.extend(runs);
+    result.shard = part.map(|part| shared(&part, arguments, &library));
     result.conclude();
     let against = baseline.map(|baseline| baseline.hold(&result)).transpose()?;
     if let Some(export) = export {
@@ -90,6 +99,10 @@ fn read(
             Some(Item::Record(first)) if is_run(&first) && arguments.redact => {
                 let text = format!("{name} is the journal of a run, and only recordings are redacted");
                 return Err(usage(text));
+            }
+            Some(Item::Record(first)) if is_of_another_part(&first, options) => {
+                while recorded.read().map_err(|source| unreadable(&name, source))?.is_some() {}
+                of_runs.push((number, recorded.counted()));
             }
             Some(Item::Record(first)) if is_run(&first) => {
                 let found = own_run(&library.rules, options, number, *first, &mut recorded)
@@ -172,6 +185,31 @@ impl From<AuditError> for Problem {
 /// Whether it is the first record of one of our own runs.
 fn is_run(record: &Record) -> bool {
     matches!(&record.event, Event::RunBegun { header } if !header.role.is_empty())
+}
+
+/// Whether it is the first record of a run with a device that another part judges.
+fn is_of_another_part(record: &Record, options: &Options) -> bool {
+    match &record.event {
+        Event::RunBegun { header } if is_run(record) => !options.does(&header.manufacturer, &header.serial_number),
+        _ => false,
+    }
+}
+
+/// What all parts of an audit share: the suites, and what is asked for. The recordings themselves are held against each other
+/// by their hashes.
+fn shared(part: &ChosenShard, arguments: &Arguments, library: &Library) -> ShardRecord {
+    let asked = format!(
+        "{:?}",
+        (
+            (&arguments.time, &arguments.topic, &arguments.payload),
+            (arguments.from, arguments.to, arguments.redact),
+            (&arguments.vehicle, &arguments.only),
+            (&arguments.topic_template, &arguments.protocol),
+        )
+    );
+    let record = ShardRecord::of(part, part.shard.of, &[library.rules.sha256.as_str(), asked.as_str()]);
+    // Which vehicles there are is known when everything was read.
+    ShardRecord { whole: 0, ..record }
 }
 
 fn unreadable(name: &str, source: std::io::Error) -> Problem {

@@ -102,6 +102,14 @@ pub fn compare(folders: &[PathBuf], format: Format) -> Result<Exit, Problem> {
         return Err(Diagnostic::whole("usage", title).into());
     }
     let audits: Vec<AuditResult> = folders.iter().map(|folder| read(folder)).collect::<Result<_, _>>()?;
+    if let Some(why) = audits
+        .windows(2)
+        .find_map(|pair| saved::parts_differ(&pair[0], &pair[1]))
+    {
+        let title = format!("these audits cannot be compared: {why}");
+        let hint = "join the parts first (report --merge), or compare a part with the same part of another audit";
+        return Err(Diagnostic::whole("compare", title).hint(hint).into());
+    }
     let names: Vec<String> = folders.iter().map(|folder| folder.display().to_string()).collect();
     let steps: Vec<Comparison> = audits
         .windows(2)

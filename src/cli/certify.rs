@@ -39,6 +39,7 @@ pub fn certify(arguments: &args::Certify, outputs: &Outputs<'_>) -> Result<Exit,
         thorough: arguments.thorough,
         budget: arguments.budget,
         certificate: true,
+        shard: arguments.shard,
         ..args::Run::default()
     };
     super::run::run_command(&run, outputs)

@@ -74,6 +74,9 @@ fn intact(folder: &Path, library: &Library) -> Result<(RunResult, String), Probl
         );
         return Err(Diagnostic::whole("manifest", title).into());
     }
+    if super::merge::is_merged(folder) {
+        return Ok((super::merge::as_saved(folder, library)?, found.root));
+    }
     let journal_path = file::find(folder);
     let Recording { journal, .. } =
         file::read(&journal_path).map_err(|error| Problem::from(Diagnostic::whole("journal", error.to_string())))?;

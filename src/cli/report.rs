@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use super::args::{Format, Report};
 use super::exit::Exit;
+use super::merge;
 use super::outputs::Outputs;
 use super::problem::Problem;
 use tck_audit::saved;
@@ -23,6 +24,9 @@ pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem
             return super::audited::compare(folders, arguments.format);
         }
         return compare_runs(arguments, folders);
+    }
+    if let (Some(folders), Some(out)) = (&arguments.merge, &arguments.out) {
+        return super::merge::merge(arguments, folders, out);
     }
     let Some(folder) = &arguments.directory else {
         return Err(Diagnostic::whole("usage", "the folder of a run is missing").into());
@@ -46,6 +50,9 @@ pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem
     }
     if arguments.attestation {
         return super::export::attestation(folder, &library);
+    }
+    if merge::is_merged(folder) {
+        return merge::report(folder, arguments, &library);
     }
     let path = file::find(folder);
     let Recording { mut journal, torn } = journal_of(&path)?;
@@ -152,14 +159,17 @@ fn own_tests(folder: &Path) -> Result<Vec<(String, String)>, Problem> {
 
 /// Refuses to write over a bundle that was changed: it would come out intact. What is missing is made again; a run that was
 /// killed has no manifest.
-fn unchanged(folder: &Path) -> Result<(), Problem> {
+pub(super) fn unchanged(folder: &Path) -> Result<(), Problem> {
     if !folder.join(manifest::NAME).exists() {
         return Ok(());
     }
     let found = manifest::Manifest::verify(folder)
         .map_err(|error| Problem::from(Diagnostic::whole("manifest", error.to_string())))?;
     let name = file::name_of(&file::find(folder));
-    let is_there = !found.missing.iter().any(|file| [NAME, PACKED].contains(&file.as_str()));
+    let is_there = !found
+        .missing
+        .iter()
+        .any(|file| [NAME, PACKED].contains(&file.as_str()) || file.starts_with(merge::PARTS));
     if found.root_holds && found.changed.is_empty() && found.extra.is_empty() && is_there {
         return Ok(());
     }
@@ -211,7 +221,7 @@ fn verify(folder: &Path, arguments: &Report) -> Result<Exit, Problem> {
     let (recordings, recordings_hold) = if saved::is_audit(folder) {
         super::audited::recordings(folder)?
     } else {
-        (Vec::new(), true)
+        merge::journals(folder)
     };
     let holds = found.holds() && is_meant && recordings_hold;
     let text = match arguments.format {
@@ -244,6 +254,14 @@ fn compare_runs(arguments: &Report, folders: &[PathBuf]) -> Result<Exit, Problem
     });
     let runs: Vec<RunResult> = runs.collect::<Result<_, _>>()?;
     let names: Vec<String> = folders.iter().map(|folder| folder.display().to_string()).collect();
+    if let Some(why) = runs
+        .windows(2)
+        .find_map(|pair| compare::parts_differ(&pair[0], &pair[1]))
+    {
+        let title = format!("these runs cannot be compared: {why}");
+        let hint = "join the parts first (report --merge), or compare a part with the same part of another run";
+        return Err(Diagnostic::whole("compare", title).hint(hint).into());
+    }
     let steps = runs.windows(2).map(|pair| compare::compare(&pair[0], &pair[1]));
     let steps: Vec<compare::Comparison> = steps.collect();
     if arguments.page {

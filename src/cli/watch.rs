@@ -34,6 +34,7 @@ pub fn watch(arguments: &Arguments) -> Result<Exit, Problem> {
             vehicles: arguments.vehicle.clone(),
             only: arguments.only.clone(),
             protocol: None,
+            shard: None,
         },
         record: arguments.record.clone().map(|path| (path, rotation)),
         metrics: arguments.metrics.clone(),

@@ -38,6 +38,7 @@ mod repeatable;
 mod resuming;
 mod scripted;
 mod selecting;
+mod sharing;
 mod simulating;
 mod started;
 mod tool;

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use askama::Template;
 
+use super::join::restricted;
 use super::result::{AuditResult, FindingResult, Mistake, SideResult, VehicleResult};
 use super::time_line::Span;
 use tck_base::verdict::{Accumulated, Verdict};
@@ -87,6 +88,9 @@ pub fn markdown(result: &AuditResult) -> String {
     };
     if result.verdict.is_none() {
         text.push_str("Nothing could be judged.\n");
+    }
+    for (_, _, sentence) in restricted(result) {
+        text.push_str(&format!("{}\n\n", plain(&sentence)));
     }
     let rows = rows(result);
     if !rows.is_empty() {
@@ -209,6 +213,14 @@ fn cases(result: &AuditResult) -> Vec<Plain> {
             text: "nothing was judged".to_owned(),
         });
     }
+    for (name, verdict, text) in restricted(result) {
+        all.push(Plain {
+            suite: "audit".to_owned(),
+            name: name.to_owned(),
+            verdict: Some(verdict),
+            text,
+        });
+    }
     all
 }
 
@@ -234,6 +246,7 @@ fn place(finding: &FindingResult, result: &AuditResult) -> String {
 struct Page<'a> {
     result: &'a AuditResult,
     title: String,
+    restricted: Vec<String>,
     columns: Vec<&'a str>,
     overview: Vec<Row>,
     broken: Vec<Broken<'a>>,
@@ -435,6 +448,10 @@ fn html(result: &AuditResult, rules: &Rules) -> askama::Result<String> {
             .map(|vehicle| shown(vehicle, link(vehicle), result))
             .collect(),
         left_out: told.len().saturating_sub(DRAWN),
+        restricted: restricted(result)
+            .into_iter()
+            .map(|(_, _, sentence)| sentence)
+            .collect(),
         broken,
         result,
     };

@@ -17,6 +17,7 @@ pub mod export;
 mod finding_group;
 mod header;
 mod hint;
+pub mod join;
 mod message_check;
 mod misnamed;
 mod mqtt_sessions;
@@ -38,6 +39,7 @@ mod vehicle;
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
+use tck_base::shard::{Shard, dealt};
 use tck_capture::{Message, SourcePosition, Told, Wire, WireEvent};
 use tck_journal::event::Packet;
 use tck_judge::Rules;
@@ -68,6 +70,8 @@ pub struct Options {
     pub only: Vec<String>,
     /// The protocol version all are judged by, whatever their messages say.
     pub protocol: Option<String>,
+    /// Only this part of the vehicles, where several processes share them.
+    pub shard: Option<Shard>,
 }
 
 impl Options {
@@ -79,6 +83,14 @@ impl Options {
                     .is_some_and(|(one, other)| (one, other) == (manufacturer, serial_number))
         };
         self.vehicles.is_empty() || self.vehicles.iter().any(named)
+    }
+
+    /// Whether a vehicle belongs to the part that is judged here. A recording does not say beforehand which vehicles it holds, so
+    /// that they are dealt out by their names.
+    #[must_use]
+    pub fn does(&self, manufacturer: &str, serial_number: &str) -> bool {
+        let dealt = |shard| dealt(&format!("{manufacturer}/{serial_number}"), shard);
+        self.shard.is_none_or(dealt)
     }
 
     /// Whether this monitor is to judge.
@@ -142,6 +154,8 @@ pub struct Audit<'r> {
     messages: u64,
     elsewhere: u64,
     beyond: u64,
+    /// Messages of vehicles that another part judges.
+    others: u64,
     places: Whence,
     hints: OnceLock<Hints>,
     misnamed: Misnamed,
@@ -187,6 +201,7 @@ impl<'r> Audit<'r> {
             messages: 0,
             elsewhere: 0,
             beyond: 0,
+            others: 0,
             places: Whence::default(),
             hints: OnceLock::new(),
             misnamed: Misnamed::default(),
@@ -226,7 +241,8 @@ impl<'r> Audit<'r> {
     #[must_use]
     pub fn address(&self, topic: &str) -> Option<Address> {
         let named = self.topics.read(topic)?;
-        let wanted = self.options.wants_vehicle(&named.manufacturer, &named.serial_number);
+        let wanted = self.options.wants_vehicle(&named.manufacturer, &named.serial_number)
+            && self.options.does(&named.manufacturer, &named.serial_number);
         wanted.then_some(Address {
             vehicle: named.key,
             manufacturer: named.manufacturer,
@@ -254,6 +270,10 @@ impl<'r> Audit<'r> {
         };
         if !self.options.wants_vehicle(&named.manufacturer, &named.serial_number) {
             self.elsewhere += 1;
+            return;
+        }
+        if !self.options.does(&named.manufacturer, &named.serial_number) {
+            self.others += 1;
             return;
         }
         let place: SourcePosition = message.place;
@@ -298,7 +318,10 @@ impl<'r> Audit<'r> {
     /// A message on a topic of no vehicle.
     fn stray(&mut self, number: u64, message: &Message) {
         self.elsewhere += 1;
-        let wanted = |beside: &Beside| self.options.wants_vehicle(&beside.manufacturer, &beside.serial_number);
+        let wanted = |beside: &Beside| {
+            let (maker, number) = (&beside.manufacturer, &beside.serial_number);
+            self.options.wants_vehicle(maker, number) && self.options.does(maker, number)
+        };
         if let Some(beside) = self.topics.beside(&message.topic).filter(wanted) {
             self.misnamed.note(&self.rules.packs, number, beside, message);
         }
@@ -331,7 +354,7 @@ impl<'r> Audit<'r> {
         let publisher = named.as_ref().filter(wanted).map(|named| Publisher {
             vehicle: named.key.clone(),
             topic: &named.name,
-            elsewhere,
+            elsewhere: elsewhere || !self.options.does(&named.manufacturer, &named.serial_number),
         });
         let scene = AuditContext {
             rules: self.rules,
@@ -399,6 +422,9 @@ impl<'r> Audit<'r> {
             last: self.last.map(|at| format!("{at:.3}")),
             elsewhere: self.elsewhere,
             beyond: self.beyond,
+            others: self.others,
+            shard: None,
+            merged: None,
             master_control: None,
             vehicles,
         };

@@ -7,6 +7,9 @@ use tck_base::verdict::Verdict;
 use tck_report::clean::{line, short};
 use tck_report::statement::many;
 
+/// What was divided among the parts of an audit.
+pub(super) const VEHICLES: &str = "vehicles was judged";
+
 /// The page.
 #[must_use]
 pub fn page(result: &AuditResult) -> String {
@@ -34,6 +37,9 @@ pub fn page(result: &AuditResult) -> String {
             }
         }
     }
+    if let Some(shard) = &result.shard {
+        let _ = writeln!(text, "{}", line(&shard.limit(VEHICLES)));
+    }
     if let (Some(first), Some(last)) = (&result.first, &result.last) {
         let _ = writeln!(text, "from {first} to {last}");
     }
@@ -57,6 +63,16 @@ pub fn page(result: &AuditResult) -> String {
             "{} of further vehicles: too many to be judged at once",
             counted(result.beyond, "message")
         );
+    }
+    if result.others > 0 {
+        let _ = writeln!(
+            text,
+            "{} of vehicles that other parts judge",
+            counted(result.others, "message")
+        );
+    }
+    for trouble in result.merged.iter().flat_map(|merged| &merged.troubles) {
+        let _ = writeln!(text, "not the whole: {}", line(&trouble.text));
     }
     let _ = writeln!(text, "{}", conclusion(result));
     text

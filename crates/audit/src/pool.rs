@@ -102,6 +102,10 @@ impl WorkerPool<'_> {
             desk.stray(desk.messages, &message);
             return;
         };
+        if !desk.options.does(&named.manufacturer, &named.serial_number) {
+            desk.others += 1;
+            return;
+        }
         let number = desk.messages;
         let owner = self.owner(&named);
         if let Some(hand) = self.hands.get_mut(owner) {

@@ -9,8 +9,10 @@ use super::finding_group;
 use super::time_line::TimeLine;
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_capture::{Counted, SourcePosition};
+use tck_journal::event::ShardRecord;
 use tck_pack::Role;
 use tck_report::manifest::digest;
+use tck_result::MergedParts;
 
 /// Format of the result of an audit.
 pub const RESULT_FORMAT: &str = "vda5050-tck.audit/1";
@@ -39,6 +41,15 @@ pub struct AuditResult {
     pub elsewhere: u64,
     /// Messages of vehicles beyond those that are judged at once.
     pub beyond: u64,
+    /// Messages of vehicles that another part judges.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub others: u64,
+    /// Which part of the vehicles was judged; absent when all of them were.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shard: Option<ShardRecord>,
+    /// The parts that were joined into it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub merged: Option<MergedParts>,
     /// The master control as a whole, where more than one vehicle heard of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub master_control: Option<Whole>,

@@ -138,6 +138,17 @@ pub fn compare(before: &AuditResult, after: &AuditResult) -> Comparison {
     comparison
 }
 
+/// Why two audits cannot be compared, where one of them is a part.
+#[must_use]
+pub fn parts_differ(before: &AuditResult, after: &AuditResult) -> Option<String> {
+    let name = |audit: &AuditResult| match &audit.shard {
+        Some(shard) => format!("part {} of {}", shard.index, shard.of),
+        None => "all of an audit".to_owned(),
+    };
+    let (one, other) = (name(before), name(after));
+    (one != other).then(|| format!("one is {one}, and the other {other}"))
+}
+
 /// What a pipeline may conclude from audits: what came in one recording and not in the other is no news, but for failures.
 #[must_use]
 pub fn outcome(audits: &[AuditResult]) -> Outcome {

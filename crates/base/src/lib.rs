@@ -1,5 +1,5 @@
 //! What everything stands on: time and its limits, devices as their drivers see them, verdicts, diagnostics, YAML,
-//! patterns, curves and secrets.
+//! patterns, curves, secrets, and shares of work.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
@@ -9,6 +9,7 @@ pub mod diagnostic;
 pub mod nurbs;
 pub mod pattern;
 pub mod secrets;
+pub mod shard;
 pub mod time;
 pub mod verdict;
 pub mod yaml;

@@ -2,8 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use sha2::{Digest as _, Sha256};
 
 use super::Reason;
+use super::payload::hex;
+use tck_base::shard::ChosenShard;
 
 /// One effective setting and where it came from.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -63,6 +66,56 @@ pub struct RunHeader {
     /// SHA-256 of the files that make the device what it is: its profile, its program, and what both of them name.
     #[serde(skip_serializing_if = "std::collections::BTreeMap::is_empty")]
     pub files: std::collections::BTreeMap<String, String>,
+    /// Which part of a run it is; absent when it is all of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shard: Option<ShardRecord>,
+}
+
+/// Which part of something it is that several processes share, and what all of them share.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
+pub struct ShardRecord {
+    /// Which part, counted from 1.
+    pub index: usize,
+    /// Of how many.
+    pub of: usize,
+    /// Who says so: `--shard`, or a scheduler with the variables that were read.
+    pub origin: String,
+    /// How many parts have something to do: where there is less to do than there are parts, the last ones have nothing.
+    pub filled: usize,
+    /// How many tests, or faults of a qualification, the parts have together; 0 where that is not known beforehand.
+    pub whole: usize,
+    /// SHA-256 over the names of all of them: parts with another one are parts of something else.
+    pub selection: String,
+}
+
+impl ShardRecord {
+    /// The part that a process does of things of these names.
+    #[must_use]
+    pub fn of(chosen: &ChosenShard, filled: usize, names: &[&str]) -> Self {
+        let mut sorted = names.to_vec();
+        sorted.sort_unstable();
+        let mut hash = Sha256::new();
+        for name in sorted {
+            hash.update(name);
+            hash.update("\n");
+        }
+        Self {
+            index: chosen.shard.index,
+            of: chosen.shard.of,
+            origin: chosen.origin.clone(),
+            filled,
+            whole: names.len(),
+            selection: hex(&hash.finalize()),
+        }
+    }
+
+    /// What the part restricts, in one sentence; `what` is what was divided.
+    #[must_use]
+    pub fn limit(&self, what: &str) -> String {
+        let Self { index, of, origin, .. } = self;
+        format!("Only part {index} of {of} of the {what} ({origin}): what the other parts found is not in here.")
+    }
 }
 
 /// A mock AGV that a master control is tested with.

@@ -16,6 +16,7 @@ mod disconnect;
 mod eval_context;
 mod gone;
 mod hidden;
+mod join;
 mod library;
 mod limit;
 mod merge;
@@ -37,6 +38,7 @@ mod traffic_judge;
 mod window;
 
 pub use gone::{Gone, Sign};
+pub use join::{Evidence, JoinError, RunPart, join};
 pub use library::Library;
 pub use monitor::MonitorJudge;
 pub use monitor_set::Observed;

@@ -25,7 +25,7 @@ pub(super) fn repetitions(done: &[TestResult]) -> Vec<TestResult> {
 }
 
 /// Puts another run of a test into its result.
-fn both(one: &mut TestResult, other: &TestResult) {
+pub(super) fn both(one: &mut TestResult, other: &TestResult) {
     let mut repetitions: Vec<Repetition> = std::mem::take(&mut one.repetitions);
     repetitions.extend(other.repetitions.iter().cloned());
     let mut rest = other;

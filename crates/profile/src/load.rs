@@ -13,8 +13,9 @@ use tck_base::diagnostic::{self, Diagnostic, Source};
 use tck_pack::Hooks;
 
 /// Variables that belong to flags which are no settings of a device.
-const OTHER_VARIABLES: [&str; 7] = [
+const OTHER_VARIABLES: [&str; 8] = [
     PASSWORD_VARIABLE,
+    tck_base::shard::SHARDS,
     "VDA5050_TCK_PROFILE",
     "VDA5050_TCK_OUT",
     "VDA5050_TCK_FORMAT",

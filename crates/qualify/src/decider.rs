@@ -2,13 +2,15 @@
 
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
+
 use tck_base::verdict::Verdict;
 use tck_judge::Library;
 use tck_result::RunResult;
 use tck_suite::Unproven;
 
 /// A clause of a test, or a monitor, deciding one requirement.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Decider {
     /// Requirement id.
     pub requirement: String,

@@ -54,7 +54,7 @@ impl Kill {
     }
 
     /// Adds what more was found with the same fault.
-    pub(super) fn join(&mut self, other: Self) {
+    pub fn join(&mut self, other: Self) {
         for (decider, verdict) in other.deciders {
             self.report(decider, verdict);
         }

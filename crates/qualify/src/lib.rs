@@ -3,7 +3,8 @@
 //! Qualification runs everything in virtual time without a fault. Each fault is then tried on the tests that are most
 //! likely to find it, and on more of them until one does ([`find`]). What is still unproven is tried with the faults
 //! that are about it, and at last with every fault ([`rest`]). What no fault fails, and which fault nothing finds, is
-//! said by name, unless the exceptions of the suites give the reason ([`outcome`]).
+//! said by name, unless the exceptions of the suites give the reason ([`outcome`]). Where several processes share the faults,
+//! each finds its own, and what all of them leave unproven is tried when they are joined ([`saved`], [`prove`]).
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
@@ -14,6 +15,7 @@ mod matrix;
 mod outcome;
 mod parallel;
 mod rest;
+pub mod saved;
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -58,6 +60,56 @@ pub fn qualify(
     faults: &[Fault],
     depth: Depth,
 ) -> Result<Qualification, EngineError> {
+    let (grounds, mut outcome) = prepared(library, pack, tests)?;
+    let role = outcome.role;
+    let faults = possible(library, pack, faults, depth);
+    outcome.kills = match depth {
+        Depth::Everything => each(&faults, |fault| grounds.kill(fault, DRAWN, &|_| true))?,
+        Depth::Faults | Depth::Clauses if outcome.is_latest => {
+            each(&faults, |fault| find::find(&grounds, role, fault))?
+        }
+        // In an older version no fault has to be found; what it fails is seen when the clauses are proven.
+        Depth::Faults | Depth::Clauses => faults.iter().map(Kill::nothing).collect(),
+    };
+    if depth == Depth::Clauses {
+        rest::Rest::new(&grounds, &outcome.deciders, &outcome.exceptions).prove(&faults, &mut outcome.kills)?;
+    }
+    Ok(outcome)
+}
+
+/// Proves what the parts of a divided qualification have left open together, as one that is not divided does at its end.
+///
+/// # Errors
+/// When a run cannot be carried out.
+pub fn prove(
+    library: &Library,
+    pack: &Pack,
+    tests: &[Arc<Test>],
+    faults: &[Fault],
+    outcome: &mut Qualification,
+) -> Result<(), EngineError> {
+    let (grounds, _) = prepared(library, pack, tests)?;
+    let faults = possible(library, pack, faults, Depth::Clauses);
+    rest::Rest::new(&grounds, &outcome.deciders, &outcome.exceptions).prove(&faults, &mut outcome.kills)
+}
+
+/// The faults that can show. What breaks only obligations that this version does not have cannot; whoever asks for it gets it
+/// tried.
+fn possible(library: &Library, pack: &Pack, faults: &[Fault], depth: Depth) -> Vec<Fault> {
+    let in_version = |id: &str| {
+        let requirement = library.rules.catalogue.get(id);
+        requirement.is_none_or(|requirement| requirement.in_version(pack).is_some())
+    };
+    let possible = |fault: &&Fault| depth == Depth::Everything || fault.breaks.iter().any(|id| in_version(id));
+    faults.iter().filter(possible).copied().collect()
+}
+
+/// What faults are tried on, and what the faultless device shows of it.
+fn prepared<'l>(
+    library: &'l Library,
+    pack: &'l Pack,
+    tests: &[Arc<Test>],
+) -> Result<(KillContext<'l>, Qualification), EngineError> {
     let role = tests.first().map_or(Role::Agv, |test| test.device);
     let mut blemishes = Vec::new();
     let mut deciders = BTreeSet::new();
@@ -88,7 +140,7 @@ pub fn qualify(
         pack,
         vehicles,
     };
-    let mut outcome = Qualification {
+    let outcome = Qualification {
         role,
         is_latest: pack.id == library.rules.packs.latest().id,
         blemishes,
@@ -96,23 +148,5 @@ pub fn qualify(
         kills: Vec::new(),
         exceptions: library.rules.suites.exceptions.of(role, pack.version),
     };
-    // What breaks only obligations that this version does not have cannot show; whoever asks for it gets it tried.
-    let in_version = |id: &str| {
-        let requirement = library.rules.catalogue.get(id);
-        requirement.is_none_or(|requirement| requirement.in_version(pack).is_some())
-    };
-    let possible = |fault: &&Fault| depth == Depth::Everything || fault.breaks.iter().any(|id| in_version(id));
-    let faults: Vec<Fault> = faults.iter().filter(possible).copied().collect();
-    outcome.kills = match depth {
-        Depth::Everything => each(&faults, |fault| grounds.kill(fault, DRAWN, &|_| true))?,
-        Depth::Faults | Depth::Clauses if outcome.is_latest => {
-            each(&faults, |fault| find::find(&grounds, role, fault))?
-        }
-        // In an older version no fault has to be found; what it fails is seen when the clauses are proven.
-        Depth::Faults | Depth::Clauses => faults.iter().map(Kill::nothing).collect(),
-    };
-    if depth == Depth::Clauses {
-        rest::Rest::new(&grounds, &outcome.deciders, &outcome.exceptions).prove(&faults, &mut outcome.kills)?;
-    }
-    Ok(outcome)
+    Ok((grounds, outcome))
 }

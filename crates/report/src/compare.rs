@@ -175,6 +175,22 @@ pub enum Outcome {
     Undecided,
 }
 
+/// Why two runs cannot be compared, where one of them is a part: what the other one lacks or has more would look like a loss or
+/// a gain.
+#[must_use]
+pub fn parts_differ(before: &RunResult, after: &RunResult) -> Option<String> {
+    let name = |run: &RunResult| match &run.shard {
+        Some(shard) => format!("part {} of {}", shard.index, shard.of),
+        None => "all of a run".to_owned(),
+    };
+    let selection = |run: &RunResult| run.shard.as_ref().map(|shard| shard.selection.clone());
+    let (one, other) = (name(before), name(after));
+    if one != other {
+        return Some(format!("one is {one}, and the other {other}"));
+    }
+    (selection(before) != selection(after)).then(|| format!("both are {one}, and of other selections of tests"))
+}
+
 /// What the last of several runs means beside the one before it, and beside the first. What became worse in between and was
 /// mended since does not count.
 #[must_use]

@@ -250,6 +250,13 @@ fn with_properties(xml: &str, result: &RunResult, flavour: Flavour<'_>) -> Strin
     };
     let device = &result.device;
     let root = flavour.root.map(|root| format!("sha256:{root}"));
+    let shard = result.shard.as_ref();
+    let origin = shard.map(|shard| shard.origin.as_str());
+    let shard = shard.map(|shard| format!("{}/{}", shard.index, shard.of));
+    let parts = result.merged.as_ref().map(|merged| {
+        let own = merged.parts.iter().filter(|part| part.counts).count();
+        format!("{own} of {}", merged.of)
+    });
     let all = [
         ("tool", Some(result.tool.as_str())),
         ("run", Some(&result.run)),
@@ -261,6 +268,9 @@ fn with_properties(xml: &str, result: &RunResult, flavour: Flavour<'_>) -> Strin
         ("serialNumber", Some(&device.serial_number)),
         ("firmwareVersion", result.setting("certificate.firmware-version")),
         ("suites", Some(&result.suites_sha256)),
+        ("shard", shard.as_deref()),
+        ("shardOrigin", origin),
+        ("parts", parts.as_deref()),
         ("root", root.as_deref()),
     ];
     let mut properties = String::from("<properties>");

@@ -248,7 +248,12 @@ pub fn statement(result: &RunResult) -> String {
         .requirements
         .iter()
         .any(|one| one.own.is_some() && one.verdict == Some(Verdict::Fail));
-    let partial = if result.partial { "This run ended early. " } else { "" };
+    let partial = match (result.partial, &result.merged) {
+        (true, Some(_)) => "These parts are not the whole. ",
+        (true, None) => "This run ended early. ",
+        (false, _) => "",
+    };
+    let share = share(result);
     let standard = format!("VDA 5050 {}", line(&result.protocol));
     let role = match role(result) {
         "AGV" => "an AGV".to_owned(),
@@ -332,7 +337,39 @@ pub fn statement(result: &RunResult) -> String {
     } else {
         ""
     };
-    format!("{own}{joined}{partial}{sentence}{own_statements}{flaky}")
+    format!("{share}{own}{joined}{partial}{sentence}{own_statements}{flaky}")
+}
+
+/// Whether a statement is about a part of a run, or about parts that were joined.
+fn share(result: &RunResult) -> String {
+    match (&result.shard, &result.merged) {
+        (Some(shard), _) => format!("Part {} of {} of a run. ", shard.index, shard.of),
+        (None, Some(merged)) => {
+            let own = merged.parts.iter().filter(|part| part.counts).count();
+            format!("Joined from {}. ", many(own, "part"))
+        }
+        (None, None) => String::new(),
+    }
+}
+
+/// Why a run is partial, as a sentence without its end.
+#[must_use]
+pub fn partial(result: &RunResult) -> Option<String> {
+    if !result.partial {
+        return None;
+    }
+    let reason = result
+        .partial_reason
+        .as_deref()
+        .map(|reason| reason.trim_end_matches('.'));
+    let what = match result.merged {
+        Some(_) => "What was joined is not the whole",
+        None => "The run ended before its plan did",
+    };
+    Some(match reason {
+        Some(reason) => format!("{what}: {reason}"),
+        None => what.to_owned(),
+    })
 }
 
 /// Whether the program that was started ended by itself.
@@ -387,14 +424,9 @@ pub fn trouble(result: &RunResult) -> Option<String> {
 #[must_use]
 pub fn limits(result: &RunResult) -> Vec<String> {
     let mut all = Vec::new();
-    if result.partial {
-        all.push(match &result.partial_reason {
-            Some(reason) => format!(
-                "The run ended before its plan did: {}.",
-                line(reason.trim_end_matches('.'))
-            ),
-            None => "The run ended before its plan did.".to_owned(),
-        });
+    // What keeps parts from being the whole stands among the limits of the result, one by one.
+    if let Some(reason) = partial(result).filter(|_| result.merged.is_none()) {
+        all.push(format!("{}.", line(&reason)));
     }
     if result.suites_modified {
         all.push("The suites differ from the ones this tool was delivered with.".to_owned());

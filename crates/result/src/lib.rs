@@ -3,7 +3,9 @@
 #![warn(missing_docs)]
 
 mod exploration;
+mod merged;
 mod not_decided;
+mod parts;
 mod program;
 mod sent;
 
@@ -12,12 +14,14 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 pub use self::exploration::{Answers, ExplorationResult, MemberResult, SaidResult};
+pub use self::merged::{MergeTrouble, MergedBundle, MergedPart, MergedParts, MergedRun, TroubleKind};
 pub use self::not_decided::NotDecided;
+pub use self::parts::{Gathered, Part, gathered, most_common};
 pub use self::program::{ProgramEnd, ProgramResult};
 pub use self::sent::{Sent, SentMember};
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_journal::Reason;
-use tck_journal::event::Setting;
+use tck_journal::event::{Setting, ShardRecord};
 
 /// `result.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -66,6 +70,12 @@ pub struct RunResult {
     /// The runs that broke off and that this one goes on with, the first one first; their journal is the beginning of this.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joined: Vec<JoinedRun>,
+    /// Which part of a run it is; absent when it is all of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shard: Option<ShardRecord>,
+    /// The parts that were joined into it; absent when it was carried out as it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub merged: Option<MergedRun>,
     /// Tests in the order they ran; not applicable ones after them.
     pub tests: Vec<TestResult>,
     /// Monitors.
@@ -539,6 +549,9 @@ pub struct RequirementResult {
     pub verdict: Option<Verdict>,
     /// Tests and monitors that decided it.
     pub decided_by: Vec<String>,
+    /// The parts in which they did, where parts were joined.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shards: Vec<usize>,
     /// Where they disagree: every verdict with those that gave it, the worst first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub verdicts: Vec<Given>,

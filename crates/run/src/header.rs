@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value, json};
 
-use tck_journal::event::{MockVehicle, RunHeader, Setting};
+use tck_journal::event::{MockVehicle, RunHeader, Setting, ShardRecord};
 use tck_journal::{Vantage, tool};
 use tck_pack::{Pack, Participant};
 use tck_profile::Secrets;
@@ -43,6 +43,8 @@ pub struct HeaderParts<'a> {
     pub command: Vec<String>,
     /// SHA-256 of the files that make the device what it is, by name.
     pub files: BTreeMap<String, String>,
+    /// Which part of a run it is.
+    pub shard: Option<ShardRecord>,
 }
 
 impl HeaderParts<'_> {
@@ -85,6 +87,7 @@ impl HeaderParts<'_> {
             bindings,
             settings: self.settings,
             files: self.files,
+            shard: self.shard,
             command: self
                 .command
                 .iter()

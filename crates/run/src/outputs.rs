@@ -92,6 +92,29 @@ pub fn write_all(
     journal: &Journal,
     inconclusive: Inconclusive,
 ) -> Result<String, OutputError> {
+    written(bundle, result, sources, Some(journal), inconclusive)
+}
+
+/// Writes the bundle of a run that was joined from parts, whose journals lie elsewhere, and returns its root hash.
+///
+/// # Errors
+/// When something cannot be made or written.
+pub fn write_joined(
+    bundle: &Bundle,
+    result: &RunResult,
+    sources: &Sources,
+    inconclusive: Inconclusive,
+) -> Result<String, OutputError> {
+    written(bundle, result, sources, None, inconclusive)
+}
+
+fn written(
+    bundle: &Bundle,
+    result: &RunResult,
+    sources: &Sources,
+    journal: Option<&Journal>,
+    inconclusive: Inconclusive,
+) -> Result<String, OutputError> {
     write_result(bundle, result)?;
     let flavour = junit::Flavour {
         inconclusive,
@@ -100,7 +123,7 @@ pub fn write_all(
     bundle.write("junit.xml", junit::render(result, flavour)?.as_bytes())?;
     let by_requirement = junit::by_requirement(result, sources, flavour)?;
     bundle.write("junit-requirements.xml", by_requirement.as_bytes())?;
-    let page = html::render(result, sources, Some(journal)).map_err(|error| OutputError::Html(error.to_string()))?;
+    let page = html::render(result, sources, journal).map_err(|error| OutputError::Html(error.to_string()))?;
     bundle.write("report.html", page.as_bytes())?;
     Ok(manifest::Manifest::write(bundle.folder())?.root)
 }

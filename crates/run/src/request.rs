@@ -1,9 +1,11 @@
 //! What a run takes on: which tests, which of their many cases, and under which name.
 
-use std::str::FromStr;
 use std::time::Duration;
 
 use super::selection::{Criteria, Selection, SelectionError};
+use super::share::share;
+use tck_base::shard::ChosenShard;
+use tck_journal::event::ShardRecord;
 use tck_judge::Library;
 use tck_pack::{Pack, Role};
 
@@ -28,6 +30,8 @@ pub struct Request {
     pub certifies: bool,
     /// What restricts the statement because of what was asked for, one sentence each.
     pub limits: Vec<String>,
+    /// Which part of a run it is.
+    pub shard: Option<ShardRecord>,
 }
 
 impl Request {
@@ -44,45 +48,13 @@ impl Request {
     }
 }
 
-/// One part of a run that several benches share.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shard {
-    /// Which part, counted from 1.
-    pub index: usize,
-    /// Of how many.
-    pub of: usize,
-}
-
-impl Shard {
-    /// Whether the test at a place of the plan, counted from 0, belongs to this part.
-    #[must_use]
-    pub fn takes(self, place: usize) -> bool {
-        place % self.of == self.index - 1
-    }
-}
-
-impl FromStr for Shard {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let parts = text
-            .split_once('/')
-            .and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
-        match parts {
-            Some((index, of)) if (1..=of).contains(&index) => Ok(Self { index, of }),
-            Some((_, 0)) => Err("there is at least one part".to_owned()),
-            Some((index, of)) => Err(format!("there is no part {index} of {of}")),
-            None => Err("a part is written like 2/4: the second of four".to_owned()),
-        }
-    }
-}
-
 /// Chooses what a run takes on. Without a word it is every test, and what is drawn differs from run to run.
 #[derive(Clone, Debug, Default)]
 pub struct RequestBuilder {
     criteria: Criteria,
     left: Option<Selection>,
-    shard: Option<Shard>,
+    shard: Option<ChosenShard>,
+    part: Option<ShardRecord>,
     seed: Option<u64>,
     thorough: bool,
     same_draw: bool,
@@ -123,8 +95,15 @@ impl RequestBuilder {
 
     /// Takes one part of the selected tests.
     #[must_use]
-    pub fn shard(mut self, shard: Shard) -> Self {
+    pub fn shard(mut self, shard: ChosenShard) -> Self {
         self.shard = Some(shard);
+        self
+    }
+
+    /// Says that what a run has left was a part of another one.
+    #[must_use]
+    pub fn part(mut self, part: Option<ShardRecord>) -> Self {
+        self.part = part;
         self
     }
 
@@ -194,13 +173,6 @@ impl RequestBuilder {
             Some(left) => left,
             None => self.criteria.among(&library.tests(role, &pack.id), library, pack)?,
         };
-        if let Some(shard) = self.shard {
-            let mut place = 0;
-            tests.retain(|_| {
-                place += 1;
-                shard.takes(place - 1)
-            });
-        }
         if tests.is_empty() {
             return Err(SelectionError::Nothing("no test was selected".to_owned()));
         }
@@ -213,11 +185,16 @@ impl RequestBuilder {
             None if self.shard.is_some() || self.same_draw => Some(1),
             None => Some(u64::from(random.as_fields().0)),
         };
-        let limit = |Shard { index, of }| {
-            format!(
-                "Only part {index} of {of} of the tests was run (--shard): what the other parts found is not in here."
-            )
+        let shard = match &self.shard {
+            Some(chosen) => Some(share(&mut tests, chosen, draw.is_some())),
+            None => self.part,
         };
+        if let Some(ShardRecord { index, of, filled, .. }) = shard.as_ref().filter(|_| tests.is_empty()) {
+            let why = format!(
+                "no test was selected for part {index} of {of}: what was selected is divided into no more than {filled}"
+            );
+            return Err(SelectionError::Nothing(why));
+        }
         Ok(Request {
             tests,
             draw,
@@ -231,7 +208,8 @@ impl RequestBuilder {
             repeat: self.repeat.max(1),
             budget: self.budget,
             certifies: self.certifies,
-            limits: self.shard.map(limit).into_iter().collect(),
+            limits: shard.iter().map(|shard| shard.limit("tests was run")).collect(),
+            shard,
         })
     }
 }
@@ -244,6 +222,14 @@ fn of_eight(id: uuid::Uuid) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tck_base::shard::Shard;
+
+    fn part(index: usize, of: usize) -> ChosenShard {
+        ChosenShard {
+            shard: Shard { index, of },
+            origin: "--shard".to_owned(),
+        }
+    }
 
     fn built(builder: RequestBuilder) -> Result<Request, SelectionError> {
         let library = tck_testing::library();
@@ -269,19 +255,48 @@ mod tests {
 
     #[test]
     fn the_parts_of_a_run_are_all_of_it_and_each_says_that_it_is_one() {
-        let all = built(RequestBuilder::new()).unwrap().tests.len();
-        let parts = (1..=3).map(|index| built(RequestBuilder::new().shard(Shard { index, of: 3 })).unwrap());
-        let parts: Vec<Request> = parts.collect();
-        assert_eq!(parts.iter().map(|part| part.tests.len()).sum::<usize>(), all);
-        for part in parts {
-            assert!(!part.tests.is_complete() && part.draw == Some(1) && part.limits.len() == 1);
+        let all = built(RequestBuilder::new()).unwrap().tests;
+        for of in [2, 3, 16] {
+            let parts = (1..=of).map(|index| built(RequestBuilder::new().shard(part(index, of))).unwrap());
+            let parts: Vec<Request> = parts.collect();
+            let mut ids: Vec<&str> = parts
+                .iter()
+                .flat_map(|part| part.tests.iter().map(|test| test.id.as_str()))
+                .collect();
+            ids.sort_unstable();
+            let mut wanted: Vec<&str> = all.iter().map(|test| test.id.as_str()).collect();
+            wanted.sort_unstable();
+            assert_eq!(ids, wanted);
+            let facts = |request: &Request| {
+                request
+                    .shard
+                    .clone()
+                    .map(|shard| (shard.filled, shard.whole, shard.selection))
+            };
+            for (at, part) in parts.iter().enumerate() {
+                assert!(!part.tests.is_complete() && part.draw == Some(1) && part.limits.len() == 1);
+                assert_eq!(
+                    part.shard.as_ref().map(|shard| (shard.index, shard.of)),
+                    Some((at + 1, of))
+                );
+                assert_eq!(facts(part), facts(&parts[0]));
+                // A table is drawn from as a whole, so that the parts draw what the whole would.
+                for test in part.tests.iter().filter(|test| test.drawn.is_some()) {
+                    let of_table =
+                        |tests: &Selection| tests.iter().filter(|other| other.table() == test.table()).count();
+                    assert_eq!(of_table(&part.tests), of_table(&all), "{}", test.id);
+                }
+            }
         }
+        let other = built(RequestBuilder::new().select("order-rejection").shard(part(1, 2))).unwrap();
+        let usual = built(RequestBuilder::new().shard(part(1, 2))).unwrap();
+        assert_ne!(other.shard.unwrap().selection, usual.shard.unwrap().selection);
     }
 
     #[test]
     fn nothing_selected_is_no_small_green_run() {
         let nothing = RequestBuilder::new().select("order-rejection/lower-update-id");
-        let second = nothing.shard(Shard { index: 2, of: 2 });
+        let second = nothing.shard(part(2, 2));
         assert!(matches!(built(second), Err(SelectionError::Nothing(_))));
     }
 }

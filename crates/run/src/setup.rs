@@ -183,6 +183,7 @@ impl DeviceUnderTest {
             fleet: self.fleet.as_ref().map_or_else(Vec::new, Fleet::bindings),
             settings: self.settings,
             files: self.files,
+            shard: request.shard,
             command: request.command,
         };
         let header = header.header();

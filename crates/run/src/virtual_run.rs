@@ -10,7 +10,7 @@ use super::session::{Finished, Progress, run};
 use super::setup::{BenchFacts, DeviceUnderTest};
 use tck_base::clock::{Moment, Stamp};
 use tck_engine::{Composer, Engine, EngineError, HookOutcome, Operator, Recorder};
-use tck_journal::event::{Event, Occurrence, Setting};
+use tck_journal::event::{Event, Occurrence, Setting, ShardRecord};
 use tck_journal::file::JournalWriter;
 use tck_journal::{Journal, Reason, Vantage};
 use tck_judge::Library;
@@ -65,6 +65,8 @@ pub struct VirtualRun {
     pub settings: Vec<Setting>,
     /// What restricts the statement because of what was asked for, one sentence each.
     pub limits: Vec<String>,
+    /// Which part of a run it is.
+    pub shard: Option<ShardRecord>,
 }
 
 impl VirtualRun {
@@ -99,6 +101,7 @@ impl VirtualRun {
             certifies: false,
             settings: Vec::new(),
             limits: Vec::new(),
+            shard: None,
         }
     }
 }
@@ -188,6 +191,7 @@ pub async fn run_virtually(
         budget: request.budget,
         certifies: request.certifies,
         limits: request.limits,
+        shard: request.shard,
     };
     let (header, setup) = tested.on(bench, asked, library, pack);
     let header = Box::new(header);

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{Format, SuiteArgs};
+use tck_base::shard::Shard;
 
 const AUDIT_HELP: &str = "\
 Examples:
@@ -70,6 +71,9 @@ pub struct Audit {
     /// Leave out names of makers, vehicles, maps, nodes, orders and loads, free texts, and where on the floor something is
     #[arg(long, conflicts_with_all = ["vehicle", "follow"])]
     pub redact: bool,
+    /// Only part I of N of the vehicles, for several processes at once; `report --merge` joins the parts (docs/shards.md)
+    #[arg(long, value_name = "I/N", conflicts_with_all = ["follow", "slice"])]
+    pub shard: Option<Shard>,
     /// How results are written to standard output
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,

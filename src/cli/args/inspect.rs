@@ -136,6 +136,7 @@ Examples:
   vda5050-tck report --compare BEFORE AFTER             what became better or worse, or is lost
   vda5050-tck report --compare audits/monday audits/tuesday   audits, too; --verify and --as take them as well
   vda5050-tck report --compare A B C --page > runs.html a page: requirement by run
+  vda5050-tck report --merge reports/parts --out DIR    the parts of a run (--shard) below a folder, as one
 
 Exit codes of --compare: 0 nothing became worse · 1 something became worse, or is not decided any more
   3 nothing became worse, but a run is partial or undecided, or a failure cannot be seen any more";
@@ -145,7 +146,7 @@ Exit codes of --compare: 0 nothing became worse · 1 something became worse, or 
 #[command(after_help = REPORT_HELP)]
 pub struct Report {
     /// The folder of a finished run, or of an audit
-    #[arg(value_name = "DIR", required_unless_present = "compare", conflicts_with = "compare")]
+    #[arg(value_name = "DIR", required_unless_present_any = ["compare", "merge"], conflicts_with_all = ["compare", "merge"])]
     pub directory: Option<PathBuf>,
     /// Check every file against the manifest; nothing is written
     #[arg(long)]
@@ -179,6 +180,13 @@ pub struct Report {
     /// Print the comparison as a page of HTML: requirement by run
     #[arg(long, requires = "compare")]
     pub page: bool,
+    /// Join parts of something that was divided (--shard), or folders that hold them, into one bundle (docs/shards.md)
+    #[arg(long, num_args = 1.., value_name = "DIR", requires = "out",
+        conflicts_with_all = ["verify", "rejudge", "certificate", "attestation", "compare", "message", "renderings"])]
+    pub merge: Option<Vec<PathBuf>>,
+    /// The new folder for what is joined
+    #[arg(long, value_name = "DIR", requires = "merge")]
+    pub out: Option<PathBuf>,
     /// How it is written to standard output
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,

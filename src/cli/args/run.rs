@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::Args;
 
 use super::{DeviceArgs, Format, OutputArgs, PeopleArgs, PipelineArgs, SelectionArgs, SuiteArgs};
-use tck_run::Shard;
+use tck_base::shard::Shard;
 
 const RUN_HELP: &str = "\
 Examples:
@@ -105,7 +105,7 @@ pub struct Run {
     /// Whether it is a run for a certificate, which is alike for everybody: set by `certify`.
     #[arg(skip)]
     pub certificate: bool,
-    /// Only part I of N of the tests, for several benches at once
+    /// Only part I of N of the tests, for several benches at once; 1/1 is all of them, whatever a scheduler says (docs/shards.md)
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
 }
@@ -196,6 +196,9 @@ pub struct Certify {
     /// Go on with the certification in this folder, which was interrupted or had too little time: what it decided is kept
     #[arg(long, value_name = "DIR", conflicts_with = "thorough")]
     pub resume: Option<PathBuf>,
+    /// Only part I of N of the tests, for several benches at once; `report --merge` joins the parts (docs/shards.md)
+    #[arg(long, value_name = "I/N", conflicts_with = "resume")]
+    pub shard: Option<Shard>,
     /// Who tests what.
     #[command(flatten)]
     pub certificate: CertificateArgs,
@@ -238,6 +241,12 @@ pub struct Qualify {
     /// For this protocol version; every one known unless said
     #[arg(long, value_name = "VERSION")]
     pub protocol: Option<String>,
+    /// Only part I of N of the faults, for several processes at once; `report --merge` joins the parts (docs/shards.md)
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<Shard>,
+    /// Write result.json, junit.xml and manifest.json into this folder
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
     /// How the outcome is written
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,

@@ -3,7 +3,7 @@
 use clap::CommandFactory as _;
 
 use super::*;
-use tck_run::Shard;
+use tck_base::shard::Shard;
 
 fn parse(line: &str) -> Result<Command, clap::Error> {
     let words = shlex::split(line).expect("words");
@@ -90,21 +90,13 @@ fn what_makes_no_sense_is_refused() {
         "report",
         "report --compare one",
         "report one --compare one two",
+        "report --merge one two",
+        "report --merge one --out two --verify",
         "report one --verify --rejudge",
         "simulate agv --count 0",
         "validate",
     ] {
         assert!(parse(line).is_err(), "{line}");
-    }
-}
-
-#[test]
-fn the_shards_of_a_run_share_its_tests_without_loss() {
-    let shards: Vec<Shard> = (1..=4)
-        .map(|index| format!("{index}/4").parse().expect("a shard"))
-        .collect();
-    for place in 0..10 {
-        assert_eq!(shards.iter().filter(|shard| shard.takes(place)).count(), 1);
     }
 }
 

@@ -206,6 +206,8 @@ fn case(end: fn() -> End, tests: Vec<TestResult>, around: fn(&mut Case)) -> Case
             suites_modified: false,
             journal: "journal.jsonl".to_owned(),
             joined: Vec::new(),
+            shard: None,
+            merged: None,
             tests,
             monitors: Vec::new(),
             requirements: Vec::new(),
@@ -242,6 +244,7 @@ fn case(end: fn() -> End, tests: Vec<TestResult>, around: fn(&mut Case)) -> Case
                 own: None,
                 verdict: Some(decision.verdict()),
                 decided_by: vec![test.id.clone()],
+                shards: Vec::new(),
                 verdicts: Vec::new(),
                 not_decided: None,
             }));
@@ -253,6 +256,7 @@ fn case(end: fn() -> End, tests: Vec<TestResult>, around: fn(&mut Case)) -> Case
             own: None,
             verdict: monitor.verdict,
             decided_by: vec![monitor.id.clone()],
+            shards: Vec::new(),
             verdicts: Vec::new(),
             not_decided: None,
         }));

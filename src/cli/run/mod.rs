@@ -27,6 +27,7 @@ use crate::ui::Prompter;
 use tck_base::clock::WallClock;
 use tck_base::diagnostic::{Diagnostic, Source, Span};
 use tck_base::secrets::Secrets;
+use tck_base::shard::ChosenShard;
 use tck_journal::file::JournalWriter;
 use tck_journal::{Reason, Vantage};
 use tck_judge::Library;
@@ -71,6 +72,11 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
     if arguments.in_virtual_time && arguments.people.page.address.is_some() {
         return Err(page::in_virtual_time());
     }
+    // What a run that goes on is a part of stands in its journal.
+    let part = match arguments.selection.resume {
+        Some(_) => None,
+        None => super::shard::chosen(arguments.shard, &surroundings)?,
+    };
     let library = crate::assets::library(arguments.suites.own())?;
     let effective = profile::load(
         arguments.device.profile.as_deref(),
@@ -93,7 +99,7 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
         Some(folder) => Some(Earlier::read(folder, &library.tests(role, &pack.id), &library)?),
         None => None,
     };
-    let request = asked(arguments, earlier.as_ref()).build(role, &library, &pack)?;
+    let request = asked(arguments, part, earlier.as_ref()).build(role, &library, &pack)?;
     if role == Role::MasterControl && arguments.vehicle.0 != tck_simulate::Vehicle::default() {
         let title = "`--vehicle` is for the reference AGV, and a master control is tested here";
         return Err(Diagnostic::whole("usage", title).into());
@@ -175,7 +181,7 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
 }
 
 /// What the command line asks for.
-fn asked(arguments: &args::Run, earlier: Option<&Earlier>) -> RequestBuilder {
+fn asked(arguments: &args::Run, part: Option<ChosenShard>, earlier: Option<&Earlier>) -> RequestBuilder {
     let wanted = &arguments.selection;
     let repeat = earlier.map_or(1, |earlier| earlier.repeat).max(wanted.repeat);
     let mut asked = RequestBuilder::new()
@@ -190,10 +196,10 @@ fn asked(arguments: &args::Run, earlier: Option<&Earlier>) -> RequestBuilder {
         .command(std::env::args().collect())
         .repeat(repeat);
     if let Some(earlier) = earlier {
-        asked = asked.left(earlier.tests.clone());
+        asked = asked.left(earlier.tests.clone()).part(earlier.part());
     }
-    if let Some(shard) = arguments.shard {
-        asked = asked.shard(shard);
+    if let Some(part) = part {
+        asked = asked.shard(part);
     }
     if let Some(seed) = arguments.seed {
         asked = asked.seed(seed);
@@ -324,6 +330,7 @@ impl Job {
         run.repeat = self.request.repeat;
         run.budget = self.request.budget;
         run.limits.clone_from(&self.request.limits);
+        run.shard.clone_from(&self.request.shard);
         run.settings = settings;
         run.earlier = self.earlier.as_ref().map(|earlier| earlier.journal.clone());
         if self.no_motion {

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::cli::problem::Problem;
 use tck_base::diagnostic::Diagnostic;
 use tck_journal::Journal;
-use tck_journal::event::{Event, RunHeader, Setting};
+use tck_journal::event::{Event, RunHeader, Setting, ShardRecord};
 use tck_journal::file::{self, Recording};
 use tck_judge as judge;
 use tck_judge::Library;
@@ -107,6 +107,11 @@ impl Earlier {
             kept,
             repeat,
         })
+    }
+
+    /// Which part of a run it was.
+    pub(super) fn part(&self) -> Option<ShardRecord> {
+        self.header.shard.clone()
     }
 
     /// Refuses to join what is about something else.

@@ -109,6 +109,7 @@ pub fn run(tests: Vec<TestResult>, monitors: Vec<MonitorResult>) -> RunResult {
                 id: (*id).to_owned(),
                 own: None,
                 verdict: found.and_then(|(verdict, _)| verdict.get()).or(passive),
+                shards: Vec::new(),
                 decided_by: match (found, passive) {
                     (Some((_, by)), _) => by.clone(),
                     (None, Some(_)) => vec!["header/id-rises".to_owned()],
@@ -155,6 +156,8 @@ pub fn run(tests: Vec<TestResult>, monitors: Vec<MonitorResult>) -> RunResult {
         suites_modified: false,
         journal: "journal.jsonl".to_owned(),
         joined: Vec::new(),
+        shard: None,
+        merged: None,
         tests,
         monitors,
         requirements,

@@ -105,6 +105,8 @@ impl RunJudge {
             suites_modified: header.modified,
             journal: "journal.jsonl".to_owned(),
             joined,
+            shard: header.shard.clone(),
+            merged: None,
             requirements: self.requirements(&tests, &watched),
             exploration: conversation_coverage::exploration(&self.rules.suites.tests, &tests, self.role),
             tests,
@@ -292,6 +294,7 @@ impl RunJudge {
                 verdict,
                 verdicts: opinions.verdicts(),
                 decided_by: opinions.by,
+                shards: Vec::new(),
                 not_decided,
             });
         }

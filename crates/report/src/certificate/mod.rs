@@ -45,6 +45,9 @@ pub enum CertificateError {
     /// The run ended early, or there was no time for all of its tests.
     #[error("this run ended before its plan did, and a part certifies nothing; `certify --resume` goes on with it")]
     Partial,
+    /// It is one part of several.
+    #[error("this is one part of a run, and a part certifies nothing; `report --merge` joins the parts")]
+    Part,
     /// The suites are not the built-in ones.
     #[error("the suites of this run differ from the built-in ones")]
     Suites,
@@ -63,6 +66,9 @@ pub enum CertificateError {
 pub fn render(result: &RunResult, sources: &Sources, root: &str) -> Result<String, CertificateError> {
     if !result.certifies() {
         return Err(CertificateError::OtherRun);
+    }
+    if result.shard.is_some() {
+        return Err(CertificateError::Part);
     }
     if result.partial || result.ran_out_of_time() {
         return Err(CertificateError::Partial);

@@ -1,7 +1,7 @@
 //! The requirement matrix: every requirement of the role and version, by chapter, gaps visible.
 
 use super::Anchors;
-use super::view::Badge;
+use super::view::{Badge, in_parts};
 use crate::sources::{HowDecided, RequirementText, Sources};
 use crate::statement::Counts;
 use tck_base::verdict::Verdict;
@@ -33,6 +33,8 @@ pub struct RequirementView {
     pub deciders: Vec<(String, Option<String>)>,
     /// Every verdict and how many gave it, where they disagree.
     pub verdicts: Option<String>,
+    /// In which of the parts that were joined.
+    pub parts: Option<String>,
     /// Why nothing decided it.
     pub gap: Option<String>,
     pub interpretation: Option<String>,
@@ -122,6 +124,7 @@ fn row(
             .map(|id| (id.clone(), anchors.decider(id)))
             .collect(),
         verdicts: disagreement(requirement),
+        parts: in_parts(requirement),
         gap: reason.or_else(|| requirement.verdict.is_none().then(|| "no reason given".to_owned())),
         interpretation: known.and_then(|known| known.interpretation.clone()),
         deviation: result.deviations.get(&requirement.id).cloned(),

@@ -76,10 +76,8 @@ fn thinned(
         ),
         badge: Badge::of(result.verdict),
         statement: statement::statement(result),
-        partial: result.partial.then(|| {
-            let reason = result.partial_reason.clone();
-            reason.unwrap_or_else(|| "the run ended before its plan did".to_owned())
-        }),
+        partial: statement::partial(result),
+        parts: view::parts(result),
         identity: view::identity(result),
         counts: view::counts(result),
         limits: statement::limits(result),
@@ -145,6 +143,7 @@ struct Page<'a> {
     badge: Badge,
     statement: String,
     partial: Option<String>,
+    parts: Vec<view::PartRow>,
     identity: Vec<(&'static str, String)>,
     counts: Vec<CountRow>,
     limits: Vec<String>,

@@ -112,6 +112,9 @@ pub fn identity(result: &RunResult) -> Vec<(&'static str, String)> {
         ("Suites", format!("{suites}SHA-256 {}", result.suites_sha256)),
         ("Run", result.run.clone()),
     ]);
+    if let Some(shard) = &result.shard {
+        rows.push(("Part", format!("{} of {} ({})", shard.index, shard.of, shard.origin)));
+    }
     rows
 }
 
@@ -121,6 +124,49 @@ pub fn started(text: &str) -> String {
         |_| text.to_owned(),
         |started| started.strftime("%Y-%m-%d %H:%M:%S UTC").to_string(),
     )
+}
+
+/// One of the parts that were joined.
+pub struct PartRow {
+    pub number: String,
+    pub badge: Badge,
+    pub run: String,
+    pub device: String,
+    pub began: String,
+    pub tests: usize,
+    /// Where its evidence is, and its hash.
+    pub journal: String,
+    pub sha256: String,
+}
+
+/// The parts that were joined.
+pub fn parts(result: &RunResult) -> Vec<PartRow> {
+    let all = result.merged.iter().flat_map(|merged| &merged.parts);
+    let rows = all.map(|part| PartRow {
+        number: match (part.index, part.counts) {
+            (0, _) => "none".to_owned(),
+            (index, true) => index.to_string(),
+            (index, false) => format!("{index}, not joined"),
+        },
+        badge: Badge::of(part.verdict),
+        run: part.run.clone(),
+        device: part.serial_number.clone(),
+        began: started(&part.started),
+        tests: part.tests.len(),
+        journal: format!("{}/{}", part.bundle, part.journal),
+        sha256: part.journal_sha256.clone(),
+    });
+    rows.collect()
+}
+
+/// `part 1` or `parts 1, 3`: in which of the parts that were joined a requirement was decided.
+pub fn in_parts(requirement: &RequirementResult) -> Option<String> {
+    let numbers: Vec<String> = requirement.shards.iter().map(ToString::to_string).collect();
+    match numbers.as_slice() {
+        [] => None,
+        [one] => Some(format!("in part {one}")),
+        all => Some(format!("in parts {}", all.join(", "))),
+    }
 }
 
 /// One row of the numbers at the top, with its bar.
