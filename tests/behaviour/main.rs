@@ -21,6 +21,7 @@ mod hostile;
 mod https;
 mod inspecting;
 mod interrupted;
+mod messages_only;
 mod mosquitto;
 mod output;
 mod overhearing;

@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::time::Duration;
 
+use super::is_command;
 use tck_base::clock::Moment;
 use tck_view::{ActionView, ErrorView, MessageView, Print, StateView};
 
@@ -88,8 +89,7 @@ impl Continuity {
         let id = message.and_then(|message| message.header().header_id.whole());
         if name == "connection" {
             // The count may begin anew on every topic of the vehicle.
-            self.last
-                .retain(|topic, _| matches!(topic.as_str(), "order" | "instantActions"));
+            self.last.retain(|topic, _| is_command(topic));
             self.shown = None;
             self.last.insert(name.to_owned(), (id, now));
             return self.early.take().map_or(Step::Begins, |early| Step::Hole(early.since));
