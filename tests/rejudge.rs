@@ -24,7 +24,7 @@ fn library() -> Library {
 #[test]
 fn a_saved_journal_gives_the_result_of_the_live_run_byte_for_byte() {
     let library = library();
-    for pack in library.rules.packs.all() {
+    for pack in library.rules.packs.of_devices() {
         for faults in [
             vec![],
             vec!["outdated-update-taken-over"],

@@ -17,7 +17,7 @@ pub(super) fn all(id: &str, library: &Library, pack: &Pack) -> Vec<Value> {
     let suites = &library.rules.suites;
     let mut found = Vec::new();
     if let Some(known) = library.rules.catalogue.get(id) {
-        found.push(requirement(known, library, pack));
+        found.push(requirement(known.edition(pack), library, pack));
     }
     let mut tests = suites.tests.iter();
     let is_meant = |test: &&std::sync::Arc<Test>| test.id == id || test.id.split('[').next() == Some(id);

@@ -31,17 +31,26 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
     if arguments.page && !matches!(arguments.what, Listing::Requirements | Listing::Language) {
         return Err(Diagnostic::whole("usage", "`--page` is about `list requirements` and `list language`").into());
     }
+    if arguments.changes.is_some() && arguments.what != Listing::Requirements {
+        return Err(Diagnostic::whole("usage", "`--changes` is about `list requirements`").into());
+    }
     let library = crate::assets::library(arguments.suites.own())?;
     let pack = super::pack(&library, arguments.protocol.as_deref())?;
     let roles: Vec<Role> = arguments
         .role
         .map_or_else(|| vec![Role::Agv, Role::MasterControl], |role| vec![role]);
+    if let Some(range) = &arguments.changes {
+        return super::changes::changes(range, &library, &roles, arguments.format);
+    }
     let text = match (arguments.what, arguments.format) {
         (Listing::Tests, format) => {
             let all = roles
                 .iter()
                 .map(|role| Ok((*role, filtered(arguments, &library, &pack, *role)?)));
             let all: Vec<_> = all.collect::<Result<_, Diagnostic>>()?;
+            if let Err(none) = library.rules.packs.for_devices(&pack.id) {
+                return Err(Problem::NothingToDo(none.to_string()));
+            }
             if all.iter().all(|(_, tests)| tests.is_empty()) {
                 return Err(Problem::NothingToDo("no test is like that".to_owned()));
             }
@@ -246,8 +255,9 @@ fn of_roles<'a>(library: &'a Library, pack: &'a Pack, roles: &'a [Role]) -> impl
         .rules
         .catalogue
         .all()
-        .filter(concerns)
         .filter(|requirement| requirement.in_version(pack).is_some())
+        .map(|requirement| requirement.edition(pack))
+        .filter(concerns)
 }
 
 fn requirements(library: &Library, pack: &Pack, roles: &[Role]) -> String {
@@ -300,7 +310,7 @@ pub fn explain(arguments: &Explain) -> Result<Exit, Problem> {
     let suites = &library.rules.suites;
     let mut text = String::new();
     if let Some(requirement) = library.rules.catalogue.get(id) {
-        text.push_str(&about_requirement(requirement, &library, &pack));
+        text.push_str(&about_requirement(requirement.edition(&pack), &library, &pack));
     }
     let table = |test: &&Arc<Test>| test.id == id || test.id.split('[').next() == Some(id);
     let cases: Vec<_> = suites.tests.iter().filter(table).collect();

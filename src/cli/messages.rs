@@ -287,7 +287,7 @@ fn message(text: &[u8], begin: Begin, judging: &Judging<'_>) -> Checked {
         let (pointer, at) = whereabouts(&flaw, topic, text, value);
         let Begin { line, column } = begin.at(text, at);
         let sentences = flaw.requirements.iter().rev();
-        let mut sentences = sentences.filter_map(|id| library.rules.catalogue.get(id));
+        let mut sentences = sentences.filter_map(|id| library.rules.catalogue.edition(id, pack));
         let nearest = pointer
             .as_deref()
             .and_then(|pointer| nearest(pack, topic, pointer, value));
@@ -416,7 +416,11 @@ pub fn topic_of(value: &Value) -> Option<&'static str> {
         ("connectionState", "connection"),
         ("typeSpecification", "factsheet"),
         ("operatingMode", "state"),
+        ("zoneSet", "zoneSet"),
+        ("responses", "responses"),
         ("agvPosition", "visualization"),
+        ("mobileRobotPosition", "visualization"),
+        ("referenceStateHeaderId", "visualization"),
         ("velocity", "visualization"),
     ]
     .into_iter()

@@ -7,6 +7,7 @@ mod baseline;
 mod browser;
 mod campaign;
 mod certify;
+mod changes;
 mod device;
 mod discover;
 mod ending;
@@ -58,7 +59,7 @@ use list::print;
 use problem::Problem;
 use tck_base::diagnostic::Diagnostic;
 use tck_judge::Library;
-use tck_pack::{Pack, Packs};
+use tck_pack::{NoPack, Pack, Packs};
 use tck_report::text::Color;
 
 /// The program.
@@ -155,17 +156,20 @@ fn color() -> Color {
 
 /// The pack of a version; the newest one unless said.
 fn pack(library: &Library, protocol: Option<&str>) -> Result<Arc<Pack>, Problem> {
-    pack_among(&library.rules.packs, protocol)
+    let packs = &library.rules.packs;
+    let found = protocol.map_or_else(|| Ok(packs.latest()), |wanted| packs.find(wanted));
+    Ok(Arc::clone(found.map_err(|none| missing(&none))?))
 }
 
-/// The pack of a version, where suites and catalogue are not needed, which take a while to be read.
-fn pack_among(packs: &Packs, protocol: Option<&str>) -> Result<Arc<Pack>, Problem> {
-    let Some(wanted) = protocol else {
-        return Ok(Arc::clone(packs.latest()));
-    };
-    packs.get(wanted).cloned().ok_or_else(|| {
-        let known: Vec<String> = packs.all().iter().map(|pack| pack.version.to_string()).collect();
-        let diagnostic = Diagnostic::whole("unknown-version", format!("there is no protocol version {wanted}"));
-        diagnostic.hint(format!("known versions: {}", known.join(", "))).into()
-    })
+/// The pack by which devices of a version are judged and simulated, where suites and catalogue are not needed, which take a
+/// while to be read; the newest one unless said.
+fn pack_for_devices(packs: &Packs, protocol: Option<&str>) -> Result<Arc<Pack>, Problem> {
+    let found = protocol.map_or_else(|| Ok(packs.latest()), |wanted| packs.for_devices(wanted));
+    Ok(Arc::clone(found.map_err(|none| missing(&none))?))
+}
+
+fn missing(none: &NoPack) -> Problem {
+    Diagnostic::whole(none.code(), none.to_string())
+        .hint(none.hint())
+        .into()
 }

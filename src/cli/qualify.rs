@@ -45,8 +45,8 @@ pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
         check_faults(roles.first().copied().unwrap_or(Role::Agv), &arguments.fault)?;
     }
     let packs = match arguments.protocol.as_deref() {
-        Some(wanted) => vec![super::pack(&library, Some(wanted))?],
-        None => library.rules.packs.all().to_vec(),
+        Some(wanted) => vec![super::pack_for_devices(&library.rules.packs, Some(wanted))?],
+        None => library.rules.packs.of_devices().cloned().collect(),
     };
     let named = !arguments.fault.is_empty();
     let depth = match (named, &part) {

@@ -96,11 +96,11 @@ fn a_version_that_is_none_hides_nothing_and_may_be_told() {
         "{}",
         ended.stdout
     );
-    state["version"] = "3.0.0".into();
+    state["version"] = "9.0.0".into();
     fs::write(bench.path().join("state.json"), state.to_string()).unwrap();
     let ended = run_in(bench.path(), &["validate", "state.json"]).code(2);
     assert!(
-        ended.stdout.contains("3.0.0 is not known to this program"),
+        ended.stdout.contains("9.0.0 is not known to this program"),
         "{}",
         ended.stdout
     );

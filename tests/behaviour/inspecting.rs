@@ -56,7 +56,7 @@ fn every_kind_of_bad_file_is_2_and_its_fault_is_named() {
         (write("cut.json", &state.as_bytes()[..100]), "cut.json"),
         (
             write("version.json", state.replace("2.1.0", "9.9.9").as_bytes()),
-            "9.9.9 is not known to this program (2.0.0, 2.1.0)",
+            "9.9.9 is not known to this program (2.0.0, 2.1.0, 3.0.0)",
         ),
         (write("other.json", b"{\"hello\": 1}"), "--topic"),
         (write("binary", b"\xff\xfe\x00"), "UTF-8"),

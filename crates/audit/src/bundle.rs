@@ -338,6 +338,7 @@ fn told<'a>(rules: &'a Rules, id: &str, pack: Option<&Pack>) -> Told<'a> {
         return Told::default();
     };
     let note = pack.and_then(|pack| requirement.in_version(pack));
+    let requirement = pack.map_or(requirement, |pack| requirement.edition(pack));
     Told {
         sentence: &requirement.text,
         section: note.map_or("", |note| note.section.as_str()),

@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::time::Duration;
 
+use super::is_command;
 use tck_base::clock::Moment;
 use tck_view::{ActionView, ErrorView, MessageView, Print, StateView};
 
@@ -61,9 +62,9 @@ impl Missing {
     fn of_topic(name: &str) -> Self {
         match name {
             "state" => Self::States,
-            "order" | "instantActions" => Self::Commands,
             "visualization" => Self::Visualization,
             "factsheet" => Self::Factsheet,
+            name if is_command(name) => Self::Commands,
             _ => Self::Anything,
         }
     }
@@ -140,8 +141,7 @@ impl Continuity {
         let id = message.and_then(|message| message.header().header_id.whole());
         if name == "connection" {
             // The count may begin anew on every topic of the vehicle.
-            self.last
-                .retain(|topic, _| matches!(topic.as_str(), "order" | "instantActions" | "connection"));
+            self.last.retain(|topic, _| is_command(topic) || topic == name);
             self.shown = None;
             let before = self.last.insert(name.to_owned(), (id, now)).and_then(|(id, _)| id);
             // A number that was left out may be the farewell, or the start, by which an order was forgotten.
@@ -179,8 +179,7 @@ impl Continuity {
             Some((last, since)) => {
                 let is_late = |last: u64, id: u64| id > last || (id > 1 && last - id <= LATE);
                 let goes_on = last.zip(id).is_some_and(|(last, id)| is_late(last, id));
-                let is_command = matches!(name, "order" | "instantActions");
-                let missing = if goes_on || is_command {
+                let missing = if goes_on || is_command(name) {
                     Missing::of_topic(name)
                 } else {
                     Missing::Anything

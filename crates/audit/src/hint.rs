@@ -1,5 +1,6 @@
-//! What is allowed in a message and yet looks like a slip: a member or an action that is nearly one of the protocol, and
-//! members that lie inside another one. Nothing of it is a mistake by itself.
+//! What is allowed in a message and yet worth a word: a member or an action that is nearly one of the protocol, members that
+//! lie inside another one, and which reading a device keeps to where the published text and schemas contradict each other.
+//! Nothing of it is a mistake by itself.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +17,7 @@ const LONGEST: usize = 64;
 /// Of so many members that are missing at least, it is asked whether they lie elsewhere.
 const WRAPPED: usize = 2;
 
-/// Something that looks like a slip.
+/// Something that looks like a slip, or is a matter of reading.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Hint {
     /// Where it stands, as a JSON pointer.
@@ -104,6 +105,14 @@ impl Hints {
         };
         search.wrapped(members, topic, message);
         search.value(members, message, 0);
+        let kept = pack
+            .schema(topic)
+            .map(|schema| schema.readings(message))
+            .unwrap_or_default();
+        search.found.extend(kept.into_iter().map(|kept| Hint {
+            text: format!("disputed, and right: {}, as in {}", kept.keeps, kept.source),
+            pointer: kept.pointer,
+        }));
         search.found
     }
 }

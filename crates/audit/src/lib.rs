@@ -44,6 +44,7 @@ use tck_capture::{Message, SourcePosition, Told, Wire, WireEvent};
 use tck_journal::event::Packet;
 use tck_judge::Rules;
 use tck_suite::model::Monitor;
+use tck_view::Topic;
 
 pub use hint::{Hint, Hints};
 pub use message_check::{Flaw, single};
@@ -129,7 +130,7 @@ pub enum AuditError {
 
 /// Whether a topic of this name is the master control's.
 fn is_command(name: &str) -> bool {
-    matches!(name, "order" | "instantActions")
+    Topic::of_name(name).is_to_vehicle()
 }
 
 /// What all vehicles share.

@@ -9,7 +9,7 @@ use super::new_findings::Found;
 use super::outcome::Outcome;
 use super::result::{FindingResult, SideResult, Stretch, Undecided, Whereabouts};
 use super::span::{self, Span};
-use super::{AuditContext, finding_group};
+use super::{AuditContext, finding_group, is_command};
 use tck_base::clock::{Moment, Stamp};
 use tck_base::verdict::Verdict;
 use tck_journal::Entry;
@@ -237,7 +237,7 @@ impl Side {
 
     /// Counts a message of this side, and whether it is held against those before it.
     pub fn note(&mut self, arrived: &Arrived, scene: AuditContext<'_>) {
-        self.spoke |= matches!(arrived.name.as_str(), "state" | "order" | "instantActions");
+        self.spoke |= arrived.name == "state" || is_command(&arrived.name);
         if arrived.stale {
             return;
         }

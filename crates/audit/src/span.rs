@@ -75,7 +75,7 @@ impl Span {
 
     /// Whether its monitors are shown messages of this topic.
     pub fn hears(self, topic: &str) -> bool {
-        let is_command = matches!(topic, "order" | "instantActions");
+        let is_command = super::is_command(topic);
         match self {
             Self::Factsheet | Self::Commands => is_command || topic == "factsheet",
             Self::States => !is_command && topic != "visualization",

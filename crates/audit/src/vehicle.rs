@@ -5,7 +5,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::AuditContext;
 use super::arrived::{Arrived, timestamp, version};
 use super::conversation::{Concluded, Conversation};
 use super::dedup::{Known, Sorted};
@@ -17,6 +16,7 @@ use super::result::{HintResult, VehicleResult, Whereabouts};
 use super::side::Side;
 use super::time_line::TimeLine;
 use super::topics::Named;
+use super::{AuditContext, is_command};
 use tck_base::clock::{Moment, Stamp};
 use tck_capture::Message;
 use tck_journal::event::{Event, Record, RunHeader, Source};
@@ -256,7 +256,7 @@ impl Vehicle {
         if self.foreign.is_some() {
             return;
         }
-        let of_vehicle = !arrived.stale && !matches!(arrived.name.as_str(), "order" | "instantActions");
+        let of_vehicle = !arrived.stale && !is_command(&arrived.name);
         self.waiting.push(arrived);
         if of_vehicle || self.waiting.len() >= WAITING {
             self.settle(scene, self.waiting.len() >= WAITING);
@@ -266,9 +266,8 @@ impl Vehicle {
     /// Whether the vehicle speaks another version from this message on: it is back with other software. Where its count
     /// goes on as if nothing had been, the version of the message is wrong instead.
     fn is_updated(&self, arrived: &Arrived, scene: AuditContext<'_>) -> bool {
-        let is_command = matches!(arrived.name.as_str(), "order" | "instantActions");
         let is_told = scene.options.protocol.is_some();
-        if arrived.stale || is_command || is_told || self.earlier.len() >= STRETCHES {
+        if arrived.stale || is_command(&arrived.name) || is_told || self.earlier.len() >= STRETCHES {
             return false;
         }
         let Some(message) = arrived.message(self.names(scene)) else {
@@ -292,7 +291,7 @@ impl Vehicle {
     /// Finds the version, and judges what waited for it.
     fn settle(&mut self, scene: AuditContext<'_>, at_last: bool) {
         let names = self.names(scene);
-        let commands = |arrived: &&Arrived| matches!(arrived.name.as_str(), "order" | "instantActions");
+        let commands = |arrived: &&Arrived| is_command(&arrived.name);
         let (sent, said): (Vec<&Arrived>, Vec<&Arrived>) = self.waiting.iter().partition(commands);
         // What was stored may be from before a change of the vehicle's software.
         let lately = said.iter().filter(|arrived| at_last || !arrived.stale);

@@ -28,7 +28,7 @@ const ROUGHLY: u64 = 20;
 pub(super) const TIMESTAMP: Check = Check {
     name: "header/timestamp",
     decides: &["HDR-03"],
-    doc: "timestamp is a point in time in UTC, written with T and Z. Another number of fraction digits than two is a \
+    doc: "timestamp is a point in time in UTC, written with T and Z. Another number of fraction digits than the version writes is a \
           warning, once, as is a clock more than five minutes away from the harness's; the will is not held to the clock. \
           Message after message at whole half hours from the clock of the harness is local time, and a time that does \
           not change from message to message of a topic is none.",
@@ -123,7 +123,12 @@ impl Timestamp {
 }
 
 impl Running for Timestamp {
-    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
         let Some(message) = record.delivered() else {
             return false;
         };
@@ -142,9 +147,10 @@ impl Running for Timestamp {
             return true;
         };
         let digits = form.get(1).map_or(0, |digits| digits.len());
-        if digits != 2 && !std::mem::replace(&mut self.digits, true) {
+        let due = context.pack.timestamp_digits();
+        if digits != due && !std::mem::replace(&mut self.digits, true) {
             let text = format!(
-                "timestamp {} has {digits} fraction digits: write two, as in {:.2}",
+                "timestamp {} has {digits} fraction digits: write {due}, as in {:.due$}",
                 quote(written),
                 record.at().utc
             );

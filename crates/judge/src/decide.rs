@@ -16,7 +16,7 @@ use super::step::{Clause, ClauseOutcome};
 pub(super) fn mood<'a>(catalogue: &'a Catalogue, pack: &Pack, id: &str) -> Option<(&'a Requirement, Mood)> {
     let requirement = catalogue.get(id)?;
     let note = requirement.in_version(pack)?;
-    Some((requirement, note.mood))
+    Some((requirement.edition(pack), note.mood))
 }
 
 /// Turns a clause into a decision; `None` when the version does not have the requirement.

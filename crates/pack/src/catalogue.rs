@@ -154,6 +154,16 @@ impl Decided {
     }
 }
 
+/// How a requirement differs from the one that the version before has under its id.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum VersionChange {
+    /// The same obligation in other words, such as another name of a member.
+    Reworded,
+    /// Another obligation about the same thing.
+    Changed,
+}
+
 /// What one protocol version says.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct VersionNote {
@@ -161,6 +171,12 @@ pub struct VersionNote {
     pub section: String,
     /// How strongly it is demanded there.
     pub mood: Mood,
+    /// What became of it in this version; `None` where it is as before.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub change: Option<VersionChange>,
+    /// What is different, in one sentence.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub delta: Option<String>,
 }
 
 /// One obligation of the standard, in our words.
@@ -180,6 +196,12 @@ pub struct Requirement {
     pub decided: Decided,
     /// By pack id, what that version says. A version that is absent does not have the requirement.
     pub versions: BTreeMap<String, VersionNote>,
+    /// By pack id, why that version does not have it any more.
+    #[serde(skip)]
+    pub gone: BTreeMap<String, String>,
+    /// By pack id, the requirement in the words of that version, where they are others.
+    #[serde(skip)]
+    pub(super) editions: BTreeMap<String, Requirement>,
     /// How to provoke it.
     pub stimulus: String,
     /// What tells obedience from breach.
@@ -207,6 +229,12 @@ impl Requirement {
     #[must_use]
     pub fn in_version(&self, pack: &Pack) -> Option<&VersionNote> {
         self.versions.get(&pack.id)
+    }
+
+    /// The requirement in the words of the version of `pack`: the one to be shown, and whose ruling counts.
+    #[must_use]
+    pub fn edition(&self, pack: &Pack) -> &Self {
+        self.editions.get(&pack.id).unwrap_or(self)
     }
 
     /// Where it can be read: where it is tracked, or the heading of the public text of that version.
@@ -238,6 +266,10 @@ impl Catalogue {
             let is_own = !assets.is_checked(&file.path) && assets.own().contains(&file.path);
             for (_, requirement) in chapter.iter_mut().flat_map(|chapter| &mut chapter.requirements) {
                 requirement.is_own = is_own;
+                requirement
+                    .editions
+                    .values_mut()
+                    .for_each(|edition| edition.is_own = is_own);
             }
             chapters.extend(chapter);
         }
@@ -292,6 +324,12 @@ impl Catalogue {
         self.requirements.get(*self.by_id.get(&RequirementId::from(id))?)
     }
 
+    /// The requirement with this id, in the words of the version of `pack`.
+    #[must_use]
+    pub fn edition(&self, id: &str, pack: &Pack) -> Option<&Requirement> {
+        Some(self.get(id)?.edition(pack))
+    }
+
     /// All of them in the order of the catalogue: by chapter, then by number.
     pub fn all(&self) -> impl Iterator<Item = &Requirement> {
         self.requirements.iter()
@@ -324,19 +362,19 @@ mod tests {
     #[test]
     fn all_requirements_are_there_once() {
         let catalogue = catalogue();
-        assert_eq!(catalogue.len(), 350);
+        assert_eq!(catalogue.len(), 623);
         let ids: BTreeSet<_> = catalogue.all().map(|requirement| &requirement.id).collect();
-        assert_eq!(ids.len(), 350);
+        assert_eq!(ids.len(), 623);
         let count = |subject| {
             catalogue
                 .all()
                 .filter(|requirement| requirement.role == subject)
                 .count()
         };
-        assert_eq!(count(Subject::Agv), 246);
-        assert_eq!(count(Subject::MasterControl), 62);
-        assert_eq!(count(Subject::Both), 33);
-        assert_eq!(count(Subject::Integrator), 8);
+        assert_eq!(count(Subject::Agv), 467);
+        assert_eq!(count(Subject::MasterControl), 108);
+        assert_eq!(count(Subject::Both), 37);
+        assert_eq!(count(Subject::Integrator), 10);
         assert_eq!(count(Subject::Broker), 1);
     }
 
@@ -374,22 +412,33 @@ mod tests {
     }
 
     #[test]
-    fn moods_of_the_newest_version_are_counted() {
+    fn the_moods_of_each_version_are_counted() {
         let (catalogue, packs) = (
             catalogue(),
             Packs::load(&Assets::of_source_tree().unwrap()).expect("packs"),
         );
-        let count = |mood| {
-            catalogue
-                .all()
-                .filter_map(|requirement| requirement.in_version(packs.latest()))
-                .filter(|note| note.mood == mood)
-                .count()
+        let count = |pack: &Pack, mood| {
+            let notes = catalogue.all().filter_map(|requirement| requirement.in_version(pack));
+            notes.filter(|note| note.mood == mood).count()
         };
-        assert_eq!(
-            (count(Mood::Shall), count(Mood::Should), count(Mood::May)),
-            (309, 35, 6)
+        let counts = |pack: &Pack| [Mood::Shall, Mood::Should, Mood::May].map(|mood| count(pack, mood));
+        assert_eq!(counts(packs.latest()), [309, 35, 6]);
+        assert_eq!(counts(packs.all().last().expect("a pack")), [539, 45, 24]);
+    }
+
+    #[test]
+    fn a_version_that_has_a_requirement_in_other_words_shows_them() {
+        let (catalogue, packs) = (
+            catalogue(),
+            Packs::load(&Assets::of_source_tree().unwrap()).expect("packs"),
         );
+        let (latest, last) = (packs.latest(), packs.all().last().expect("a pack"));
+        let topics = |pack: &Pack| catalogue.edition("TOPIC-01", pack).expect("a requirement").text.clone();
+        assert!(topics(last).contains("zoneSet") && !topics(latest).contains("zoneSet"));
+        let malformed = catalogue.get("ORD-REJ-02").expect("a requirement");
+        assert!(malformed.edition(last).text.contains("VALIDATION_FAILURE"));
+        assert!(malformed.edition(latest).text.contains("validationError"));
+        assert_eq!(malformed.edition(last).id, malformed.id);
     }
 
     #[test]
@@ -427,7 +476,7 @@ mod tests {
                 _ => None,
             })
             .collect();
-        assert_eq!(reasons.len(), 6);
+        assert_eq!(reasons.len(), 8);
         assert!(reasons.iter().all(|reason| reason.len() > 20));
     }
 
@@ -436,7 +485,7 @@ mod tests {
         let catalogue = catalogue();
         let ids: Vec<_> = catalogue.all().map(|requirement| requirement.id.as_str()).collect();
         assert_eq!(ids[..2], ["MQTT-01", "MQTT-02"]);
-        assert!(ids[349].starts_with("BP-"));
+        assert!(ids[622].starts_with("BP-"));
         // Those of the standard have two digits; those of somebody's own have what their tracker gives them.
         let digits = |id: &str| id.rsplit('-').next().map(str::len);
         assert!(ids.iter().all(|id| RequirementId::is_one(id) && digits(id) == Some(2)));

@@ -42,13 +42,14 @@ pub(super) fn read(source: &Arc<Source>, problems: &mut Vec<Diagnostic>) -> Opti
     Some(Chapter { position, requirements })
 }
 
-const KEYS: [&str; 13] = [
+const KEYS: [&str; 14] = [
     "id",
     "text",
     "role",
     "decided",
     "reason",
     "in",
+    "gone",
     "stimulus",
     "observe",
     "needs",
@@ -57,6 +58,26 @@ const KEYS: [&str; 13] = [
     "otherwise",
     "link",
 ];
+
+/// What can be said of one version.
+const NOTE_KEYS: [&str; 13] = [
+    "section",
+    "mood",
+    "change",
+    "delta",
+    "text",
+    "decided",
+    "reason",
+    "stimulus",
+    "observe",
+    "needs",
+    "interpretation",
+    "because",
+    "otherwise",
+];
+
+/// Where a version takes a ruling back.
+const NO_RULING: &str = "none";
 
 impl Reader<'_> {
     fn requirement(&mut self, node: &Node, group: &str, chapter: &str) -> Option<(Span, Requirement)> {
@@ -74,18 +95,8 @@ impl Reader<'_> {
             .iter()
             .filter_map(|need| self.as_text(need))
             .collect();
-        for reason in ["because", "otherwise"] {
-            if let Some(said) = node.get(reason).filter(|_| node.get("interpretation").is_none()) {
-                let title = format!("`{reason}` without an interpretation");
-                self.problem(
-                    said,
-                    &title,
-                    "there is no ruling",
-                    "write `interpretation`, or take this out",
-                );
-            }
-        }
-        let requirement = Requirement {
+        self.reasons(node);
+        let mut requirement = Requirement {
             id: RequirementId::from(id.as_str()),
             group: group.to_owned(),
             chapter: chapter.to_owned(),
@@ -93,6 +104,8 @@ impl Reader<'_> {
             role: self.choice(node, "role", &["agv", "master-control", "both", "integrator", "broker"])?,
             decided: self.decided(node)?,
             versions: self.versions(node)?,
+            gone: self.gone(node),
+            editions: BTreeMap::new(),
             stimulus: self.text(node, "stimulus")?,
             observe: self.text(node, "observe")?,
             needs,
@@ -102,7 +115,72 @@ impl Reader<'_> {
             link: node.get("link").and_then(|link| self.link(link)),
             is_own: false,
         };
+        for (version, said) in node.get("in").and_then(Node::map).unwrap_or_default() {
+            if let (Some(version), Some(edition)) = (version.text(), self.edition(said, &requirement)) {
+                requirement.editions.insert(version.to_owned(), edition);
+            }
+        }
         Some((place.span.clone(), requirement))
+    }
+
+    /// A reason belongs to a ruling.
+    fn reasons(&mut self, node: &Node) {
+        for reason in ["because", "otherwise"] {
+            if let Some(said) = node.get(reason).filter(|_| node.get("interpretation").is_none()) {
+                let title = format!("`{reason}` without an interpretation");
+                let hint = "write `interpretation`, or take this out";
+                self.problem(said, &title, "there is no ruling", hint);
+            }
+        }
+    }
+
+    /// The requirement in the words of one version; `None` where they are the common ones.
+    fn edition(&mut self, said: &Node, common: &Requirement) -> Option<Requirement> {
+        let mut own = |key: &str| said.get(key).and_then(|text| self.as_text(text));
+        let (text, stimulus, observe) = (own("text"), own("stimulus"), own("observe"));
+        let (ruling, because, otherwise) = (own("interpretation"), own("because"), own("otherwise"));
+        self.reasons(said);
+        let decided = said.get("decided").and_then(|_| self.decided(said));
+        let needs = said.get("needs").and_then(|_| self.list(said, "needs"));
+        let needs = needs.map(|all| all.iter().filter_map(|need| self.as_text(need)).collect());
+        let mut edition = common.clone();
+        if let Some(ruling) = ruling {
+            edition.interpretation = Some(ruling).filter(|ruling| ruling != NO_RULING);
+            edition.because = because;
+            edition.otherwise = otherwise;
+        }
+        edition.text = text.unwrap_or(edition.text);
+        edition.stimulus = stimulus.unwrap_or(edition.stimulus);
+        edition.observe = observe.unwrap_or(edition.observe);
+        edition.decided = decided.unwrap_or(edition.decided);
+        edition.needs = needs.unwrap_or(edition.needs);
+        edition.editions.clear();
+        let is_other = Requirement {
+            editions: common.editions.clone(),
+            ..edition.clone()
+        } != *common;
+        is_other.then_some(edition)
+    }
+
+    /// Why later versions do not have it any more.
+    fn gone(&mut self, node: &Node) -> BTreeMap<String, String> {
+        let Some(place) = node.get("gone") else {
+            return BTreeMap::new();
+        };
+        let Some(entries) = place.map() else {
+            self.wrong(place, "a mapping from version to a reason");
+            return BTreeMap::new();
+        };
+        let mut gone = BTreeMap::new();
+        for (version, reason) in entries {
+            let Some(name) = version.text() else { continue };
+            if node.get("in").is_some_and(|versions| versions.get(name).is_some()) {
+                let title = format!("version {name} has it, and it is gone there");
+                self.problem(version, &title, "both", "take one of the two out");
+            }
+            gone.extend(self.as_text(reason).map(|reason| (name.to_owned(), reason)));
+        }
+        gone
     }
 
     fn decided(&mut self, node: &Node) -> Option<Decided> {
@@ -131,10 +209,13 @@ impl Reader<'_> {
         };
         let mut versions = BTreeMap::new();
         for (version, said) in entries {
-            self.known(said, &["section", "mood"]);
+            self.known(said, &NOTE_KEYS);
+            let change = said.get("change");
             let said = VersionNote {
                 section: self.text(said, "section")?,
                 mood: self.choice(said, "mood", &["shall", "should", "may"])?,
+                change: change.and_then(|_| self.choice(said, "change", &["reworded", "changed"])),
+                delta: said.get("delta").and_then(|delta| self.as_text(delta)),
             };
             versions.insert(version.text()?.to_owned(), said);
         }
@@ -163,6 +244,7 @@ impl Reader<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::VersionChange;
 
     const GOOD: &str = r#"group: A-B
 chapter: Title
@@ -216,6 +298,56 @@ requirements:
         let chapter = read(&Source::new("x.yaml", linked), &mut problems).expect("chapter");
         let (_, requirement) = &chapter.requirements[0];
         assert_eq!(requirement.link.as_deref(), Some("https://tracker.example/A-B-01"));
+    }
+
+    /// A requirement that a later version has in other words.
+    fn reworded() -> String {
+        let later = "in:\n      \"9.9\": { section: \"1\", mood: may }\n      \"10.0\":\n        section: \"2\"\n        \
+                     mood: shall\n        change: changed\n        delta: It is stronger.\n        text: Do it at once.\n        \
+                     interpretation: none\n    gone: { \"11.0\": Nobody did it. }";
+        GOOD.replace("in: { \"9.9\": { section: \"1\", mood: may } }", later)
+    }
+
+    #[test]
+    fn a_version_can_have_it_in_other_words() {
+        let mut problems = Vec::new();
+        let chapter = read(&Source::new("x.yaml", reworded()), &mut problems).expect("chapter");
+        assert!(problems.is_empty(), "{problems:?}");
+        let (_, requirement) = &chapter.requirements[0];
+        assert_eq!(requirement.text, "Do it.");
+        assert_eq!(requirement.editions.keys().collect::<Vec<_>>(), ["10.0"]);
+        let later = &requirement.editions["10.0"];
+        assert_eq!(
+            (later.text.as_str(), later.interpretation.as_deref()),
+            ("Do it at once.", None)
+        );
+        assert_eq!(later.observe, requirement.observe);
+        assert_eq!(requirement.versions["10.0"].change, Some(VersionChange::Changed));
+        assert_eq!(requirement.versions["10.0"].delta.as_deref(), Some("It is stronger."));
+        assert_eq!(requirement.gone["11.0"], "Nobody did it.");
+    }
+
+    #[test]
+    fn mistakes_about_versions_are_named() {
+        for (good, bad, expected) in [
+            ("change: changed", "change: new", "`new` is not known for `change`"),
+            ("delta:", "deltas:", "unknown key `deltas`"),
+            ("\"11.0\"", "\"10.0\"", "version 10.0 has it, and it is gone there"),
+            (
+                "gone: { \"11.0\": Nobody did it. }",
+                "gone: never",
+                "a text where a mapping from version to a reason is due",
+            ),
+            (
+                "interpretation: none",
+                "because: Of it.",
+                "`because` without an interpretation",
+            ),
+        ] {
+            let text = reworded().replacen(good, bad, 1);
+            assert_ne!(text, reworded());
+            assert_eq!(titles(&text).first().map(String::as_str), Some(expected), "{bad}");
+        }
     }
 
     #[test]

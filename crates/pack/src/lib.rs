@@ -1,9 +1,9 @@
 //! A protocol version as data, the catalogue of requirements, and the vocabulary of hooks.
 //!
-//! A [`Pack`] is one folder of `schemas/`: six JSON schemas, `protocol.toml` and `vocabulary.yaml`. The
-//! [`Catalogue`] is `suites/requirements/`, [`Hooks`] are `suites/hooks/`. All come from [`Assets`], the embedded files
-//! or a replacement. Versions are data: no code below or above names one. What a message *means* is left to
-//! patterns, checks and the judge.
+//! A [`Pack`] is one folder of `schemas/`: a JSON schema for each topic, `protocol.toml`, `vocabulary.yaml` and, where the
+//! published text is disputed, `errata.yaml`. The [`Catalogue`] is `suites/requirements/`, [`Hooks`] are `suites/hooks/`.
+//! All come from [`Assets`], the embedded files or a replacement. Versions are data: no code below or above names one.
+//! What a message *means* is left to patterns, checks and the judge.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
@@ -11,6 +11,8 @@ mod assets;
 mod breakage;
 mod catalogue;
 mod catalogue_file;
+mod changes;
+mod errata;
 mod fields;
 mod hooks;
 mod hooks_file;
@@ -19,6 +21,7 @@ mod protocol;
 mod reader;
 mod schema;
 mod shape;
+mod validator;
 mod version;
 
 #[cfg(test)]
@@ -26,10 +29,12 @@ mod tests;
 
 pub use assets::{AssetFile, Assets};
 pub use breakage::{Breakage, BreakageScope, Way};
-pub use catalogue::{Catalogue, Decided, Mood, Requirement, RequirementId, Subject, VersionNote};
+pub use catalogue::{Catalogue, Decided, Mood, Requirement, RequirementId, Subject, VersionChange, VersionNote};
+pub use changes::{ChangeKind, RequirementChange};
+pub use errata::KeptReading;
 pub use hooks::{HookChange, HookEffect, HookInfo, HookParameter, HookRisk, HookValue, Hooks};
 pub use participant::Participant;
-pub use protocol::{Pack, PackError, Packs, TopicName, TopicRule, VersionClaim};
+pub use protocol::{NoPack, Pack, PackError, Packs, TopicName, TopicRule, VersionClaim};
 pub use schema::{Finding, FindingKind, MessageSchema};
 pub use shape::Shape;
 pub use version::{Version, VersionRange};

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use tck_view::Names;
 
+use super::errata::Erratum;
 use super::fields::{self, FieldRule};
 use super::schema::FindingKind;
 use super::{AssetFile, Assets, MessageSchema, Role, Version};
@@ -55,19 +56,37 @@ pub struct TopicRule {
     pub mandatory: bool,
 }
 
+/// What can be judged by a version.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Judged {
+    /// Messages, one by one.
+    Messages,
+    /// Devices, by tests and beside reference devices.
+    Devices,
+}
+
 /// `protocol.toml`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Protocol {
     id: String,
     version: String,
+    judges: Vec<Judged>,
     topic_template: String,
+    #[serde(default = "usual_digits")]
+    timestamp_digits: usize,
     topic: Vec<TopicRule>,
     features: BTreeMap<String, bool>,
     fields: Vec<FieldRule>,
     #[serde(default)]
     members: Names,
     document: Option<Document>,
+}
+
+/// How many digits a timestamp has behind the second, unless a version says it.
+fn usual_digits() -> usize {
+    2
 }
 
 /// The public text of a version.
@@ -86,11 +105,13 @@ pub struct Pack {
     pub id: String,
     /// The version written into headers.
     pub version: Version,
+    judges: Vec<Judged>,
     topics: Vec<TopicRule>,
     schemas: BTreeMap<String, MessageSchema>,
     vocabulary: Value,
     words: Arc<Map<String, Value>>,
     topic_template: String,
+    timestamp_digits: usize,
     features: BTreeMap<String, bool>,
     fields: Vec<FieldRule>,
     names: Arc<Names>,
@@ -122,6 +143,14 @@ pub enum PackError {
         /// What is wrong, with places.
         problems: Vec<Diagnostic>,
     },
+    /// `errata.yaml` cannot be used.
+    #[error("{path}: {message}")]
+    Errata {
+        /// The file.
+        path: String,
+        /// What is wrong.
+        message: String,
+    },
     /// A schema does not parse or compile.
     #[error("{path} is not a schema: {message}")]
     Schema {
@@ -145,10 +174,12 @@ impl Pack {
         {
             return Err(wrong("folder, id and version do not agree".to_owned()));
         }
+        let errata = read_errata(assets, &format!("{folder}/errata.yaml"))?;
         let mut schemas = BTreeMap::new();
         for topic in &protocol.topic {
             let path = format!("{folder}/{}.schema.json", topic.name);
-            let schema = read_schema(assets, &path)?;
+            let disputed = errata.iter().filter_map(|one| one.of_topic(topic.name.as_str()));
+            let schema = read_schema(assets, &path)?.with_errata(disputed.collect());
             schemas.insert(topic.name.to_string(), schema);
         }
         let vocabulary = read_vocabulary(assets, &format!("{folder}/vocabulary.yaml"))?;
@@ -158,14 +189,22 @@ impl Pack {
             words: Arc::new(words),
             id: protocol.id,
             version,
+            judges: protocol.judges,
             topics: protocol.topic,
             schemas,
             topic_template: protocol.topic_template,
+            timestamp_digits: protocol.timestamp_digits,
             features: protocol.features,
             fields: protocol.fields,
             names: Arc::new(protocol.members),
             document: protocol.document,
         })
+    }
+
+    /// Whether there are tests and reference devices of this version, so that devices can be judged by it, and not only messages.
+    #[must_use]
+    pub fn judges_devices(&self) -> bool {
+        self.judges.contains(&Judged::Devices)
     }
 
     /// The topics of the protocol.
@@ -210,6 +249,12 @@ impl Pack {
     /// `{manufacturer}`, `{serialNumber}` and `{topic}`.
     pub fn topic_template(&self) -> &str {
         &self.topic_template
+    }
+
+    /// How many digits a timestamp has behind the second.
+    #[must_use]
+    pub fn timestamp_digits(&self) -> usize {
+        self.timestamp_digits
     }
 
     /// Fills the placeholders of a topic template. What is filled in is not searched for placeholders again, and
@@ -294,6 +339,20 @@ fn read_schema(assets: &Assets, path: &str) -> Result<MessageSchema, PackError> 
         })
 }
 
+/// What is disputed in a version; nothing where it has no such file.
+fn read_errata(assets: &Assets, path: &str) -> Result<Vec<Erratum>, PackError> {
+    let Some(file) = assets.get(path) else {
+        return Ok(Vec::new());
+    };
+    let wrong = |message: String| PackError::Errata {
+        path: path.to_owned(),
+        message,
+    };
+    let first = |problems: Vec<Diagnostic>| problems.first().map_or_else(String::new, |first| first.title.clone());
+    let tree = yaml::tree(&Source::new(path, file.text.as_str())).map_err(|problems| wrong(first(problems)))?;
+    serde_json::from_value(yaml::value(&tree)).map_err(|error| wrong(error.to_string()))
+}
+
 fn read_vocabulary(assets: &Assets, path: &str) -> Result<Value, PackError> {
     let file = assets.get(path).ok_or_else(|| PackError::Missing(path.to_owned()))?;
     yaml::tree(&Source::new(path, file.text.as_str()))
@@ -324,7 +383,8 @@ impl Packs {
             .map(|file| Pack::load(assets, file).map(Arc::new))
             .collect::<Result<Vec<_>, _>>()?;
         all.sort_by_key(|pack| (pack.version.major, pack.version.minor));
-        let latest = all.last().cloned().ok_or(PackError::None)?;
+        let whole = all.iter().rev().find(|pack| pack.judges_devices());
+        let latest = whole.or(all.last()).cloned().ok_or(PackError::None)?;
         Ok(Self { all, latest })
     }
 
@@ -333,7 +393,12 @@ impl Packs {
         &self.all
     }
 
-    /// The newest.
+    /// Those that devices can be judged by, oldest first.
+    pub fn of_devices(&self) -> impl Iterator<Item = &Arc<Pack>> {
+        self.all.iter().filter(|pack| pack.judges_devices())
+    }
+
+    /// The newest that devices can be judged by.
     pub fn latest(&self) -> &Arc<Pack> {
         &self.latest
     }
@@ -345,6 +410,31 @@ impl Packs {
         self.all
             .iter()
             .find(|pack| (pack.version.major, pack.version.minor) == (version.major, version.minor))
+    }
+
+    /// The pack by which the devices of a version are judged.
+    ///
+    /// # Errors
+    /// There is no such version, or only its messages can be judged.
+    pub fn for_devices(&self, version: &str) -> Result<&Arc<Pack>, NoPack> {
+        let pack = self.find(version)?;
+        pack.judges_devices()
+            .then_some(pack)
+            .ok_or_else(|| NoPack::MessagesOnly {
+                version: pack.version,
+                others: listed(self.of_devices()),
+            })
+    }
+
+    /// The pack of a version, whatever its patch level.
+    ///
+    /// # Errors
+    /// There is no such version.
+    pub fn find(&self, version: &str) -> Result<&Arc<Pack>, NoPack> {
+        self.get(version).ok_or_else(|| NoPack::Unknown {
+            version: version.to_owned(),
+            known: listed(self.all.iter()),
+        })
     }
 
     /// What a text that stands where a version is due is worth.
@@ -361,7 +451,8 @@ impl Packs {
 
     /// Whether such a version of the protocol exists, or may come to exist.
     fn may_exist(&self, version: Version) -> bool {
-        let is_later = (version.major, version.minor) > (self.latest.version.major, self.latest.version.minor);
+        let newest = self.all.last().map_or(self.latest.version, |newest| newest.version);
+        let is_later = (version.major, version.minor) > (newest.major, newest.minor);
         is_later || EARLIER.contains(&(version.major, version.minor))
     }
 
@@ -387,4 +478,57 @@ pub enum VersionClaim<'p> {
     Unknown(Version),
     /// No version that was ever published.
     NoVersion,
+}
+
+/// Why there is no pack for what is asked.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NoPack {
+    /// There are no rules for it.
+    #[error("there is no protocol version {version}")]
+    Unknown {
+        /// What was asked for.
+        version: String,
+        /// Those that there are, in words.
+        known: String,
+    },
+    /// There are no tests and no reference devices of it.
+    #[error(
+        "of protocol version {version} only messages can be judged: there are no tests and no reference devices of it yet"
+    )]
+    MessagesOnly {
+        /// The version.
+        version: Version,
+        /// Those that devices can be judged by, in words.
+        others: String,
+    },
+}
+
+impl NoPack {
+    /// A word for programs.
+    #[must_use]
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Unknown { .. } => "unknown-version",
+            Self::MessagesOnly { .. } => "messages-only",
+        }
+    }
+
+    /// What can be done instead.
+    #[must_use]
+    pub fn hint(&self) -> String {
+        match self {
+            Self::Unknown { known, .. } => format!("known versions: {known}"),
+            Self::MessagesOnly { others, .. } => {
+                format!("`validate`, `audit` and `watch` judge its messages; devices are judged by {others}")
+            }
+        }
+    }
+}
+
+/// Versions in one line.
+fn listed<'p>(packs: impl Iterator<Item = &'p Arc<Pack>>) -> String {
+    packs
+        .map(|pack| pack.version.to_string())
+        .collect::<Vec<_>>()
+        .join(", ")
 }

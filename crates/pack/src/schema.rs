@@ -1,21 +1,21 @@
 //! One message schema, compiled once: what is wrong with a message, and what the schema says about a path.
 //!
-//! The only place that names the schema crate. Relations between fields are left to named checks.
+//! Relations between fields are left to named checks.
 
 use std::collections::HashSet;
 use std::fmt;
 use std::sync::Arc;
 
+use jsonschema::ValidationError;
 use jsonschema::error::{TypeKind, ValidationErrorKind};
-use jsonschema::{Draft, ValidationError, Validator};
 use serde_json::Value;
 
 use super::Shape;
+use super::errata::{Disputed, KeptReading};
+use super::validator::{Validator, bounded};
 
 /// At most this many findings per message.
 const MAX_FINDINGS: usize = 50;
-/// At most this many characters of a device's value in a message of ours.
-const MAX_SHOWN: usize = 80;
 
 /// The schema of one topic. Clones share the compiled form.
 #[derive(Clone)]
@@ -24,6 +24,7 @@ pub struct MessageSchema(Arc<Compiled>);
 struct Compiled {
     raw: Value,
     validator: Validator,
+    errata: Vec<Disputed>,
 }
 
 /// One place where a message breaks its schema.
@@ -58,12 +59,20 @@ pub enum FindingKind {
 impl MessageSchema {
     /// Compiles a schema, formats asserted.
     pub(super) fn compile(raw: Value) -> Result<Self, String> {
-        let validator = jsonschema::options()
-            .with_draft(Draft::Draft202012)
-            .should_validate_formats(true)
-            .build(&raw)
-            .map_err(|error| bounded(&error.to_string()))?;
-        Ok(Self(Arc::new(Compiled { raw, validator })))
+        let validator = Validator::of(&raw)?;
+        Ok(Self(Arc::new(Compiled {
+            raw,
+            validator,
+            errata: Vec::new(),
+        })))
+    }
+
+    /// The same schema where the messages of its topic are disputed.
+    pub(super) fn with_errata(self, errata: Vec<Disputed>) -> Self {
+        match Arc::try_unwrap(self.0) {
+            Ok(compiled) => Self(Arc::new(Compiled { errata, ..compiled })),
+            Err(shared) => Self(shared),
+        }
     }
 
     /// What is wrong with `message`: one finding per path, at most 50. None means the message obeys.
@@ -75,12 +84,25 @@ impl MessageSchema {
         let mut seen = HashSet::new();
         self.0
             .validator
-            .iter_errors(message)
+            .errors(message)
             .map(|error| finding(&error))
+            .filter(|finding| {
+                !self
+                    .0
+                    .errata
+                    .iter()
+                    .any(|one| one.excuses(&finding.path, finding.kind == FindingKind::Missing, message))
+            })
             // A number where a word is due is neither of the type nor of the enumeration; the first says it all.
             .filter(|finding| seen.insert(finding.path.clone()))
             .take(MAX_FINDINGS)
             .collect()
+    }
+
+    /// Where the published text and schemas contradict each other, and the message keeps to another reading than the usual one.
+    #[must_use]
+    pub fn readings(&self, message: &Value) -> Vec<KeptReading> {
+        self.0.errata.iter().filter_map(|one| one.kept(message)).collect()
     }
 
     /// The schema as it was read.
@@ -162,6 +184,7 @@ fn finding(error: &ValidationError<'_>) -> Finding {
             format!("{} does not have the form {pattern}", shown(value)),
         ),
         ValidationErrorKind::Format { format } => (FindingKind::Pattern, format!("{} is not a {format}", shown(value))),
+        ValidationErrorKind::FalseSchema => (FindingKind::Other, format!("{} must not stand here", shown(value))),
         _ => (FindingKind::Other, bounded(&error.masked().to_string())),
     };
     Finding { path, kind, message }
@@ -179,13 +202,6 @@ fn shown(value: &Value) -> String {
         // Cut first: the text may be megabytes long.
         Value::String(text) => Value::String(bounded(text)).to_string(),
         other => bounded(&other.to_string()),
-    }
-}
-
-fn bounded(text: &str) -> String {
-    match text.char_indices().nth(MAX_SHOWN) {
-        Some((at, _)) => format!("{}…", &text[..at]),
-        None => text.to_owned(),
     }
 }
 

@@ -36,6 +36,7 @@ pub fn sources(library: &Library, pack: &Pack) -> Sources {
     let given = |path: &String| Some((path.clone(), library.assets.as_given(path)?));
     let requirements = library.rules.catalogue.all().filter_map(|requirement| {
         let note = requirement.in_version(pack)?;
+        let requirement = requirement.edition(pack);
         Some(RequirementText {
             id: requirement.id.as_str().to_owned(),
             chapter: requirement.chapter.clone(),

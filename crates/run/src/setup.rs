@@ -242,17 +242,15 @@ pub struct BenchFacts {
 /// The protocol version that a profile says; the latest where it says none.
 ///
 /// # Errors
-/// When there is no such version.
+/// When there is no such version, or only its messages can be judged.
 pub fn pack_of(library: &Library, effective: &Effective) -> Result<Arc<Pack>, Diagnostic> {
     let packs = &library.rules.packs;
     let Some(wanted) = &effective.profile.device.protocol else {
         return Ok(Arc::clone(packs.latest()));
     };
-    packs.get(wanted).cloned().ok_or_else(|| {
-        let known: Vec<String> = packs.all().iter().map(|pack| pack.version.to_string()).collect();
-        let title = format!("there is no protocol version {wanted}");
-        let diagnostic = effective.complain("device.protocol", "unknown-version", title, "this version");
-        diagnostic.hint(format!("known versions: {}", known.join(", ")))
+    packs.for_devices(wanted).cloned().map_err(|none| {
+        let diagnostic = effective.complain("device.protocol", none.code(), none.to_string(), "this version");
+        diagnostic.hint(none.hint())
     })
 }
 
@@ -293,11 +291,10 @@ fn join_others(
     for group in &profile.vehicles.others {
         let own: &Pack = match &group.protocol {
             None => pack,
-            Some(version) => packs.get(version).ok_or_else(|| {
-                let known: Vec<String> = packs.all().iter().map(|pack| pack.version.to_string()).collect();
-                let title = format!("there is no protocol version {version}");
-                let diagnostic = Diagnostic::new("unknown-version", group.span.clone(), title, "of these vehicles");
-                vec![diagnostic.hint(format!("known versions: {}", known.join(", ")))]
+            Some(version) => packs.for_devices(version).map_err(|none| {
+                let span = group.span.clone();
+                let diagnostic = Diagnostic::new(none.code(), span, none.to_string(), "of these vehicles");
+                vec![diagnostic.hint(none.hint())]
             })?,
         };
         let like = mock(profile, layout, own);

@@ -14,6 +14,7 @@ Examples:
   vda5050-tck list tests --filter 'chapter(6.6) and not tag(moves)'
   vda5050-tck list coverage --role agv     which requirement is decided by what, or by nothing
   vda5050-tck list coverage --uncovered    what nothing decides
+  vda5050-tck list requirements --changes 2.1.0..3.0.0
   vda5050-tck list hooks                   what a profile can do for a test
   vda5050-tck list language                the reference of the language of suites, as a page of Markdown";
 
@@ -40,6 +41,9 @@ pub struct List {
     /// is always a page
     #[arg(long)]
     pub page: bool,
+    /// Of the requirements, what became of them from one version to a later one, such as 2.0.0..2.1.0
+    #[arg(long, value_name = "FROM..TO")]
+    pub changes: Option<String>,
     /// How it is written
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,

@@ -275,6 +275,7 @@ impl RunJudge {
         }
         let mut all = Vec::new();
         for requirement in self.rules.catalogue.all() {
+            let requirement = requirement.edition(&self.ground.pack);
             let id = requirement.id.as_str();
             let opinions = decided.remove(id);
             // What another version asks is listed when a vehicle that speaks it has decided it.

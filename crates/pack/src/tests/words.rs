@@ -2,6 +2,8 @@
 
 use serde_json::json;
 
+use tck_view::{Field, ProtocolFeatures, SafetyState, StateView};
+
 use super::super::{Pack, Role};
 use super::packs;
 
@@ -14,7 +16,7 @@ fn a_pack_is_found_by_any_patch_level() {
             assert_eq!(packs.get(&version).expect("pack").id, pack.id);
         }
     }
-    assert_eq!(packs.latest().id, packs.all().last().expect("pack").id);
+    assert_eq!(packs.latest().id, packs.of_devices().last().expect("pack").id);
     assert!(packs.get("9.9").is_none() && packs.get("latest").is_none());
 }
 
@@ -30,10 +32,16 @@ fn topics_know_their_publisher_and_their_transport() {
             "connection",
             "factsheet",
         ];
-        assert_eq!(names, expected);
+        assert_eq!(names[..6], expected);
+        let more: &[&str] = if pack.names().lacks(StateView::zone_requests) {
+            &[]
+        } else {
+            &["zoneSet", "responses"]
+        };
+        assert_eq!(&names[6..], more, "{}", pack.id);
         for topic in pack.topics() {
             let name = topic.name.as_str();
-            let commands = ["order", "instantActions"].contains(&name);
+            let commands = ["order", "instantActions", "zoneSet", "responses"].contains(&name);
             assert_eq!(
                 topic.publisher,
                 if commands { Role::MasterControl } else { Role::Agv },
@@ -41,7 +49,8 @@ fn topics_know_their_publisher_and_their_transport() {
             );
             assert_eq!(topic.qos, u8::from(name == "connection"), "{name}");
             assert_eq!(topic.retain, ["connection", "factsheet"].contains(&name), "{name}");
-            assert_eq!(topic.mandatory, name != "visualization", "{name}");
+            let optional = ["visualization", "zoneSet", "responses"].contains(&name);
+            assert_eq!(topic.mandatory, !optional, "{name}");
         }
         assert!(pack.topic("instant_actions").is_none());
     }
@@ -68,18 +77,25 @@ fn the_vocabulary_has_a_word_for_every_topic_and_status() {
         for topic in pack.topics() {
             assert_eq!(pack.word(&format!("topic.{}", topic.name)), Some(topic.name.as_str()));
         }
+        let name = |field: Field| pack.names().name(field).expect("a name");
         for (path, schema_path) in [
             ("connection", ("connection", &["connectionState"][..])),
             ("actionStatus", ("state", &["actionStates", "actionStatus"])),
             ("operatingMode", ("state", &["operatingMode"])),
             ("errorLevel", ("state", &["errors", "errorLevel"])),
             ("infoLevel", ("state", &["information", "infoLevel"])),
-            ("emergencyStop", ("state", &["safetyState", "eStop"])),
+            (
+                "emergencyStop",
+                ("state", &["safetyState", name(SafetyState::emergency_stop)]),
+            ),
             ("blockingType", ("order", &["nodes", "actions", "blockingType"])),
             ("orientationType", ("order", &["edges", "orientationType"])),
             (
                 "scope",
-                ("factsheet", &["protocolFeatures", "agvActions", "actionScopes"]),
+                (
+                    "factsheet",
+                    &["protocolFeatures", name(ProtocolFeatures::actions), "actionScopes"],
+                ),
             ),
         ] {
             let schema = pack.schema(schema_path.0).expect("schema");
@@ -94,10 +110,9 @@ fn the_vocabulary_has_a_word_for_every_topic_and_status() {
             said.sort();
             assert_eq!(said, allowed, "{} {path}", pack.id);
         }
-        assert_eq!(pack.word("error.outdatedUpdate"), Some("orderUpdateError"));
-        assert_eq!(pack.word("connection.broken"), Some("CONNECTIONBROKEN"));
-        assert_eq!(pack.word("error.newOrderWhileBusy"), None);
-        assert!(pack.vocabulary()["error"]["newOrderWhileBusy"].is_object());
+        assert!(pack.word("error.outdatedUpdate").is_some() && pack.word("connection.broken").is_some());
+        assert_eq!(pack.word("error.badContinuation"), None);
+        assert!(pack.vocabulary()["error"]["badContinuation"].is_object());
         assert_eq!(pack.word("error.nonsense"), None);
     }
 }
@@ -150,6 +165,24 @@ fn predefined_actions_use_the_words_of_their_version() {
             for status in to.as_array().expect("list") {
                 assert!(statuses.contains(&status.as_str().expect("text").to_owned()));
             }
+        }
+    }
+}
+
+#[test]
+fn predefined_errors_have_a_level_and_are_words_of_the_version() {
+    for pack in packs().all() {
+        let levels = pack.vocabulary()["errorLevel"].as_object().expect("levels");
+        let words = pack.vocabulary()["error"].as_object().expect("errors");
+        let Some(errors) = pack.vocabulary().get("predefinedError") else {
+            continue;
+        };
+        let errors = errors.as_object().expect("errors");
+        assert_eq!(errors.len(), words.values().filter(|word| word.is_string()).count());
+        for (name, error) in errors {
+            assert!(words.values().any(|word| word == name.as_str()), "{name}");
+            assert!(levels.values().any(|level| *level == error["level"]), "{name}");
+            assert!(error["references"].is_array() && error["until"].is_string(), "{name}");
         }
     }
 }
