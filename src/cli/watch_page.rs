@@ -110,6 +110,7 @@ impl<V: Viewer> Viewer for BesideViewer<'_, V> {
                 )
             }
             Happening::Lost(why) => format!("the connection to the broker is lost, and tried again: {why}"),
+            Happening::NotRecorded(why) => format!("nothing is recorded any more: {why}"),
         });
     }
 

@@ -77,7 +77,7 @@ impl TryFrom<Vec<RawReading>> for Readings {
         }
         let read = |raw: RawReading| {
             Ok(Reading {
-                is: Validator::compile(raw.is)?,
+                is: Validator::of(&raw.is)?,
                 source: raw.reading,
                 keeps: raw.keeps,
             })
