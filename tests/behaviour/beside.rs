@@ -74,7 +74,7 @@ fn first_event(stream: &mut (impl std::io::Read + std::io::Write), url: &str) ->
     let (host, secret) = parts(url);
     write!(stream, "GET /{secret}/events HTTP/1.1\r\nhost: {host}\r\n\r\n").ok()?;
     let mut heard = String::new();
-    let mut part = [0; 65_536];
+    let mut part = vec![0; 65_536];
     loop {
         let count = stream.read(&mut part).ok().filter(|count| *count > 0)?;
         heard.push_str(&String::from_utf8_lossy(&part[..count]));

@@ -410,7 +410,14 @@ mod tests {
         let late = |at| hole(at, Missing::States);
         assert_eq!(
             found,
-            [Step::Begins, Step::Follows, late(1), Step::Follows, Step::Follows, late(4)]
+            [
+                Step::Begins,
+                Step::Follows,
+                late(1),
+                Step::Follows,
+                Step::Follows,
+                late(4)
+            ]
         );
         // A vehicle that was started anew unseen may be another one.
         let anew = steps(&[

@@ -92,7 +92,11 @@ impl Conversation {
                 }
             }
             // Nothing that was told is taken back.
-            if let Some(since) = self.continuity.restarted_unseen().filter(|since| scene.live && *since == moment) {
+            if let Some(since) = self
+                .continuity
+                .restarted_unseen()
+                .filter(|since| scene.live && *since == moment)
+            {
                 for side in &mut self.sides {
                     side.broken(since, Missing::Anything, Apart::Missing);
                 }

@@ -186,10 +186,11 @@ impl Place {
     /// How many runs it has had.
     #[must_use]
     pub fn attempts(&self) -> u64 {
-        (1..)
-            .take_while(|attempt| self.events(*attempt).exists())
-            .last()
-            .unwrap_or(0)
+        let mut attempts = 0;
+        while self.events(attempts + 1).exists() {
+            attempts += 1;
+        }
+        attempts
     }
 
     /// What a run of it has come to, by the exit code of its process, which has none when a signal ended it; nothing when it was
@@ -217,34 +218,12 @@ impl Place {
             attempts,
         };
         if JUDGED.contains(&exit)
-            && let Some(why) = self.lack(told, exit)
+            && let Some(why) = lack(told, exit)
         {
             settled.exit = BROKEN;
             settled.said = why;
         }
         settled
-    }
-
-    /// What is missing of the evidence of a run that has judged.
-    fn lack(&self, told: &Told, exit: u8) -> Option<String> {
-        let Some(bundle) = &told.bundle else {
-            return Some(format!(
-                "the run ended with exit code {exit}, and there is no bundle of it"
-            ));
-        };
-        if told.exit != Some(exit) {
-            return Some(format!(
-                "the run ended with exit code {exit}, and its events do not say so"
-            ));
-        }
-        match Manifest::verify(bundle) {
-            Ok(found) if !found.holds() => Some("its bundle is not what its manifest says".to_owned()),
-            Ok(found) if told.root.as_deref() != Some(found.root.as_str()) => {
-                Some("its bundle is another one than its events say".to_owned())
-            }
-            Ok(_) => None,
-            Err(error) => Some(error.to_string()),
-        }
     }
 
     fn below(&self, bundle: &Path) -> String {
@@ -294,12 +273,12 @@ impl Place {
         let folder = self.folder();
         let failed = |error| PlaceError::Io(folder.clone(), error);
         for attempt in 1..=self.attempts() {
-            let old = (1..)
-                .map(|number| folder.join(format!("before-{number}-{attempt}.jsonl")))
-                .find(|old| !old.exists());
-            if let Some(old) = old {
-                std::fs::rename(self.events(attempt), old).map_err(failed)?;
+            let mut number = 1;
+            let before = |number: u64| folder.join(format!("before-{number}-{attempt}.jsonl"));
+            while before(number).exists() {
+                number += 1;
             }
+            std::fs::rename(self.events(attempt), before(number)).map_err(failed)?;
         }
         match std::fs::remove_file(folder.join(SETTLED)) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => Err(failed(error)),
@@ -356,6 +335,28 @@ impl Told {
     /// Whether it can be gone on with: it did not come to its end, or somebody has interrupted it.
     fn is_open(&self) -> bool {
         self.exit.is_none_or(|exit| exit == INTERRUPTED)
+    }
+}
+
+/// What is missing of the evidence of a run that has judged.
+fn lack(told: &Told, exit: u8) -> Option<String> {
+    let Some(bundle) = &told.bundle else {
+        return Some(format!(
+            "the run ended with exit code {exit}, and there is no bundle of it"
+        ));
+    };
+    if told.exit != Some(exit) {
+        return Some(format!(
+            "the run ended with exit code {exit}, and its events do not say so"
+        ));
+    }
+    match Manifest::verify(bundle) {
+        Ok(found) if !found.holds() => Some("its bundle is not what its manifest says".to_owned()),
+        Ok(found) if told.root.as_deref() != Some(found.root.as_str()) => {
+            Some("its bundle is another one than its events say".to_owned())
+        }
+        Ok(_) => None,
+        Err(error) => Some(error.to_string()),
     }
 }
 

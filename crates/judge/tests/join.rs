@@ -269,9 +269,9 @@ fn any_part() -> impl Strategy<Value = RunPart> {
         );
         one.result.run = format!("{run}");
         match odd {
-            0 => one.result.protocol = "2.0.0".to_owned(),
+            0 => "2.0.0".clone_into(&mut one.result.protocol),
             1 => one.result.partial = true,
-            2 => one.result.device.serial_number = "2".to_owned(),
+            2 => "2".clone_into(&mut one.result.device.serial_number),
             _ => {}
         }
         // What has one key has one content.

@@ -17,7 +17,8 @@ const PLACES: usize = 512;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Erratum {
-    erratum: String,
+    #[serde(rename = "erratum")]
+    name: String,
     at: Vec<Place>,
     member: Option<String>,
     readings: Readings,
@@ -113,7 +114,7 @@ impl Erratum {
     pub(super) fn of_topic(&self, topic: &str) -> Option<Disputed> {
         let at: Vec<_> = self.at.iter().filter(|place| place.topic == topic).collect();
         (!at.is_empty()).then(|| Disputed {
-            erratum: self.erratum.clone(),
+            erratum: self.name.clone(),
             at: at.into_iter().map(|place| place.path.clone()).collect(),
             member: self.member.clone(),
             readings: self.readings.clone(),

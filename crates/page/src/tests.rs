@@ -100,7 +100,7 @@ impl Browser {
                 self.heard.drain(..begin + end);
                 return Some(serde_json::from_str(&text).unwrap());
             }
-            let mut bytes = [0; 65_536];
+            let mut bytes = vec![0; 65_536];
             let read = tokio::time::timeout(Duration::from_secs(20), self.stream.read(&mut bytes));
             let count = read.await.unwrap().unwrap();
             if count == 0 {

@@ -30,12 +30,15 @@ fn spoilt(pack: &Pack, name: &str, changes: &[(&str, Option<Value>)]) -> (String
     (name.split('-').next().expect("topic").to_owned(), message)
 }
 
+/// A contradiction, a good message, and what is changed in it: pointer and value.
+type Case<'a> = (&'a str, &'a str, Vec<(String, Option<Value>)>);
+
 #[test]
 fn either_reading_is_right_and_the_unusual_one_is_named() {
     let pack = with_zones();
     let flag = "/protocolFeatures/mobileRobotActions/0/pauseAllowed";
     let zone = |at: usize, member: &str| format!("/zoneSet/zones/{at}/{member}");
-    let cases: Vec<(&str, &str, Vec<(String, Option<Value>)>)> = vec![
+    let cases: Vec<Case<'_>> = vec![
         (
             "name-of-the-kinematics",
             "factsheet-full",
