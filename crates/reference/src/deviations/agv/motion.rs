@@ -3,16 +3,17 @@
 use super::prelude::*;
 
 records! {
-    fault "position-frozen" ["MAP-01"] "From the beginning of an order on it reports the position at which it took it, until the next one begins."
+    fault "position-frozen" ["MAP-01"] "As long as nodes of an order are left, it reports the position at which it took the order."
         => keep::<Option<(f64, f64)>>()
             .happens(|taken, agv, event| if let Event::Begun = event {
                 let pose = agv.motion.pose(agv.moment());
                 *taken = Some((pose.x, pose.y));
             })
-            .says(|taken, _, part, p| {
+            .says(|taken, agv, part, p| {
+                let taken = taken.filter(|_| !agv.order.nodes.is_empty());
                 if let (Part::Position, Some((x, y))) = (part, taken) {
-                    p.set("x", *x);
-                    p.set("y", *y);
+                    p.set("x", x);
+                    p.set("y", y);
                 }
                 true
             });
