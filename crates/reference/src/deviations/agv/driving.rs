@@ -13,8 +13,16 @@ use super::prelude::*;
 records! {
     fault "stops-on-link-loss" ["MQTT-04"] "Stands still as long as the link is down."
         => forbidding(|agv, what| matches!(what, Permission::Drive) && !agv.connection.online);
-    fault "next-edge-not-entered-offline" ["MQTT-04"] "Without a link the vehicle ends the edge it is on and then stands on its next node, although more of its base is left."
-        => forbidding(|agv, what| matches!(what, Permission::SetOut(_)) && !agv.connection.online && !agv.order.entered && agv.order.edge_ahead().is_some());
+    fault "next-edge-not-entered-offline" ["MQTT-04"] "Without a link the vehicle ends the edge it is on and then stands on its next node, although more of its base is left, until the link has been back for a second."
+        => keep::<Option<Moment>>()
+            .happens(|back, agv, event| if event == Event::Connected && agv.connection.sessions > 1 {
+                *back = Some(agv.moment());
+            })
+            .allows(|back, agv, what, usual| {
+                let waits = back.is_some_and(|back| agv.moment().since(back) < Duration::from_secs(1));
+                let stands = !agv.connection.online || waits;
+                usual && !(stands && matches!(what, Permission::SetOut(_)) && !agv.order.entered && agv.order.edge_ahead().is_some())
+            });
     // Stranded between two nodes, it would be of no use for any further test.
     fault "stops-before-end-of-base" ["ORD-06"] "Stops one node before the end of the base."
         => forbidding(|agv, what| matches!(what, Permission::SetOut(stop) if stop.node.sequence_id == agv.order.base_end.1 && agv.config.node(&agv.order.last_node).is_some()));

@@ -3,11 +3,20 @@
 use super::prelude::*;
 
 records! {
-    fault "position-frozen" ["MAP-01"] "Reports the position at which it was switched on wherever it is."
-        => position(|agv, p| if let Some(start) = agv.config.node(&agv.config.start_node) {
-            p.set("x", start.x);
-            p.set("y", start.y);
-        });
+    fault "position-frozen" ["MAP-01"] "As long as nodes of an order are left, it reports the position at which it took the order."
+        => keep::<Option<(f64, f64)>>()
+            .happens(|taken, agv, event| if let Event::Begun = event {
+                let pose = agv.motion.pose(agv.moment());
+                *taken = Some((pose.x, pose.y));
+            })
+            .says(|taken, agv, part, p| {
+                let taken = taken.filter(|_| !agv.order.nodes.is_empty());
+                if let (Part::Position, Some((x, y))) = (part, taken) {
+                    p.set("x", x);
+                    p.set("y", y);
+                }
+                true
+            });
     fault "degrees-reported" ["MAP-02", "STATE-MSG-05", "ORD-CANCEL-15"] "Reports its orientation in degrees."
         => position(|_, p| number(p, "theta", |theta| theta.to_degrees() + 180.0));
     fault "theta-never-negative" ["MAP-02", "STATE-MSG-05"] "It reports its orientation between 0 and two pi."
