@@ -141,6 +141,7 @@ impl Continuity {
         let id = message.and_then(|message| message.header().header_id.whole());
         if name == "connection" {
             // The count may begin anew on every topic of the vehicle.
+            let last_state = self.last.get("state").map_or(now, |(_, at)| *at);
             self.last.retain(|topic, _| is_command(topic) || topic == name);
             self.shown = None;
             let before = self.last.insert(name.to_owned(), (id, now)).and_then(|(id, _)| id);
@@ -151,6 +152,11 @@ impl Continuity {
             self.holes += u64::from(is_skipped);
             self.has_order = false;
             return match (reset, early) {
+                // Silence before it may be explained by what was lost.
+                (None, None) if is_skipped => Step::Hole(Hole {
+                    since: last_state,
+                    missing: Missing::States,
+                }),
                 (None, None) => Step::Begins,
                 (None, Some(since)) => Step::Hole(Hole {
                     since,

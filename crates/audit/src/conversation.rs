@@ -87,7 +87,7 @@ impl Conversation {
                     Step::Begins if begins_anew && side.role == Role::MasterControl => {
                         side.broken(arrived.at.moment, Missing::Knowledge, Apart::Connection);
                     }
-                    Step::Follows if arrived.name == "state" => side.confirmed(scene),
+                    Step::Follows if arrived.name == "state" => side.confirmed(&arrived.name, scene),
                     _ => {}
                 }
             }
@@ -139,7 +139,7 @@ impl Conversation {
                 side.note(arrived, scene);
             }
             if own && publisher == Role::Agv && !self.continuity.is_early() {
-                side.confirmed(scene);
+                side.confirmed(&arrived.name, scene);
             }
         }
     }

@@ -297,11 +297,18 @@ impl Side {
         }
     }
 
-    /// Nothing was missing up to here.
-    pub fn confirmed(&mut self, scene: AuditContext<'_>) {
+    /// Nothing was missing up to a message on this topic. What the states alone show waits for the next state: only that one tells
+    /// whether another one was lost.
+    pub fn confirmed(&mut self, by: &str, scene: AuditContext<'_>) {
+        let mut waiting = VecDeque::new();
         while let Some(open) = self.open.pop_front() {
-            self.count(open, scene);
+            if open.span == Span::States && by != "state" {
+                waiting.push_back(open);
+            } else {
+                self.count(open, scene);
+            }
         }
+        self.open = waiting;
     }
 
     /// Counts a finding that can still be taken back.

@@ -86,7 +86,7 @@ impl Span {
 
     /// Whether what is found may still be explained by the next message: one that was missing shows itself late.
     pub const fn waits(self) -> bool {
-        matches!(self, Self::Conversation | Self::Way)
+        matches!(self, Self::States | Self::Conversation | Self::Way)
     }
 
     /// Whether it may begin only where no order and no action is under way.

@@ -72,6 +72,13 @@ impl MalformedOrders {
         action.is_some_and(|action| self.actions.iter().any(|known| known == action))
     }
 
+    /// Whether an order of this name was sent whose number cannot be read, so that nobody can say what it released.
+    #[must_use]
+    pub fn has_unnumbered(&self, order: &str) -> bool {
+        let mut all = self.broken_ones.iter();
+        all.any(|(id, number)| id == order && number.is_none())
+    }
+
     /// Keeps in mind what a malformed message says.
     fn note_parts<'m>(
         &mut self,

@@ -32,7 +32,7 @@ pub(crate) const LAST_NODE: Check = Check {
     name: "state/last-node",
     decides: &["STATE-MSG-04", "ORD-01", "ORD-07"],
     doc: "lastNodeId and lastNodeSequenceId move along the order in its sequence, and never onto a node that was not \
-          released. Not judged while the state shows a malformed order of the harness: that it was taken is the mistake.",
+          released. Not judged in an order of which an update had no number that can be read: that it was taken is the mistake.",
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Shown, Fact::Orders, Fact::Malformed],
@@ -343,7 +343,7 @@ impl Running for LastNode {
         if sent.is_empty() || sent.iter().any(|sent| !sent.sound || sent.places) {
             return false;
         }
-        if context.world.malformed().is_shown(record) {
+        if context.world.malformed().has_unnumbered(&order) {
             return false;
         }
         let nodes = || sent.iter().flat_map(|sent| &sent.nodes);
