@@ -64,7 +64,8 @@ fn run(library: &Library, pack: &Pack, role: Role, faults: &[&str], part: Option
     Some(run_silently(library, pack, request).expect("a run").result)
 }
 
-/// What a result says, without what differs from run to run: times, and the numbers of records.
+/// What a result says, without what differs from run to run: times, the numbers of records, and what a monitor saw kept. That
+/// depends on how a vehicle came from one test to the next.
 fn said(result: &RunResult) -> String {
     let tests: BTreeMap<&str, String> = result
         .tests
@@ -81,19 +82,16 @@ fn said(result: &RunResult) -> String {
             )
         })
         .collect();
-    let requirements: Vec<String> = result
-        .requirements
-        .iter()
-        .map(|one| {
-            let by: BTreeSet<&String> = one.decided_by.iter().collect();
-            format!("{} {:?} {:?} {by:?}", one.id, one.verdict, one.not_decided)
-        })
-        .collect();
-    let monitors: Vec<String> = result
-        .monitors
-        .iter()
-        .map(|one| format!("{} {:?}", one.id, one.verdict))
-        .collect();
+    let requirements = result.requirements.iter().filter_map(|one| {
+        let all = one.decided_by.iter().map(String::as_str);
+        let by: BTreeSet<&str> = all.filter(|by| tests.contains_key(by)).collect();
+        let is_said = one.verdict == Some(Verdict::Fail) || !by.is_empty();
+        is_said.then(|| format!("{} {:?} {:?} {by:?}", one.id, one.verdict, one.not_decided))
+    });
+    let requirements: Vec<String> = requirements.collect();
+    let monitors = result.monitors.iter();
+    let monitors = monitors.filter(|one| matches!(one.verdict, Some(Verdict::Fail | Verdict::Warning)));
+    let monitors: Vec<String> = monitors.map(|one| format!("{} {:?}", one.id, one.verdict)).collect();
     format!("{:?}\n{tests:#?}\n{requirements:#?}\n{monitors:#?}", result.verdict)
 }
 

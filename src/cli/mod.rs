@@ -5,6 +5,7 @@ mod audit;
 mod audited;
 mod baseline;
 mod browser;
+mod bundle_state;
 mod campaign;
 mod certify;
 mod changes;

@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::args::{Format, Report};
+use super::bundle_state;
 use super::exit::Exit;
 use super::merge;
 use super::outputs::Outputs;
 use super::problem::Problem;
 use tck_audit::saved;
 use tck_base::diagnostic::Diagnostic;
-use tck_journal::file::{self, NAME, PACKED, Recording};
+use tck_journal::file::{self, Recording};
 use tck_judge as judge;
 use tck_report::{clean, compare, headline, json as result_file, manifest, overview, side_by_side};
 use tck_result::RunResult;
@@ -65,7 +66,7 @@ pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem
     if arguments.rejudge {
         return rejudge(folder, &result, arguments.format);
     }
-    unchanged(folder)?;
+    bundle_state::unchanged(folder)?;
     let pack = super::pack(&library, Some(&result.protocol))?;
     journal.set_names(pack.names());
     let quoted = sources(&library, &pack);
@@ -155,31 +156,6 @@ fn own_tests(folder: &Path) -> Result<Vec<(String, String)>, Problem> {
         all.push((format!("suites/{role}/explore/{name}"), text));
     }
     Ok(all)
-}
-
-/// Refuses to write over a bundle that was changed: it would come out intact. What is missing is made again; a run that was
-/// killed has no manifest.
-pub(super) fn unchanged(folder: &Path) -> Result<(), Problem> {
-    if !folder.join(manifest::NAME).exists() {
-        return Ok(());
-    }
-    let found = manifest::Manifest::verify(folder)
-        .map_err(|error| Problem::from(Diagnostic::whole("manifest", error.to_string())))?;
-    let name = file::name_of(&file::find(folder));
-    let is_there = !found
-        .missing
-        .iter()
-        .any(|file| [NAME, PACKED].contains(&file.as_str()) || file.starts_with(merge::PARTS));
-    if found.root_holds && found.changed.is_empty() && found.extra.is_empty() && is_there {
-        return Ok(());
-    }
-    let title = format!(
-        "{} is not what its manifest says, and nothing is written over it\n{}",
-        folder.display(),
-        found.text().trim_end()
-    );
-    let hint = format!("copy `{name}` alone into another folder, and give that one; `--rejudge` writes nothing");
-    Err(Diagnostic::whole("manifest", title).hint(hint).into())
 }
 
 fn rejudge(folder: &Path, result: &RunResult, format: Format) -> Result<Exit, Problem> {

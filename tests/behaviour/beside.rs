@@ -238,7 +238,7 @@ fn beyond_this_machine_is_said_and_shown_as_a_code() {
     bench
         .run(&["run", "--reference", REFUSAL, "--page=nowhere"])
         .code(2)
-        .says("nowhere");
+        .says("the port is missing");
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("--page={}", taken.local_addr().unwrap());
     bench

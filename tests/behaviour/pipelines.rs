@@ -180,7 +180,7 @@ fn a_start_that_failed_leaves_no_bundle_and_the_failures_before_it_are_still_kno
     fs::write(bench.path().join("device.toml"), profile.text()).unwrap();
     bench
         .run(&["run", "--profile", "device.toml", QUICK])
-        .code(5)
+        .code(2)
         .says_one_error("no-such-program");
     assert_eq!(bundles(&bench.path().join("reports")), before);
     bench.run(&["report", "--as", "junit", "reports/latest"]).code(2);
@@ -249,7 +249,7 @@ fn what_goes_wrong_before_a_run_is_an_annotation_with_file_and_line() {
     let line = text.lines().position(|line| line.starts_with("command")).unwrap() + 1;
     fs::write(bench.path().join("device.toml"), text).unwrap();
     on_github(&["run", "--profile", "device.toml", QUICK])
-        .code(5)
+        .code(2)
         .says(&format!("::error file=device.toml,line={line},title=vda5050-tck::"));
     on_github(&["run", "--nonsense"])
         .code(2)

@@ -43,7 +43,8 @@ fn run(bench: &Bench, tests: &[&str], more: &[&str]) -> Ended {
     bench.run(&[&fixed[..], more, tests].concat())
 }
 
-/// What a result says, without what differs from run to run: times, and the numbers of records.
+/// What a result says, without what differs from run to run: times, the numbers of records, and what a monitor saw kept. That
+/// depends on how a vehicle came from one test to the next.
 fn said(result: &Value) -> [BTreeMap<String, String>; 4] {
     let tests = list(result, "tests").iter().map(|test| {
         let decisions: BTreeSet<String> = list(test, "decisions")
@@ -66,16 +67,16 @@ fn said(result: &Value) -> [BTreeMap<String, String>; 4] {
             ),
         )
     });
-    let requirements = list(result, "requirements").iter().map(|one| {
-        let by: BTreeSet<String> = list(one, "decided_by").iter().map(ToString::to_string).collect();
-        (
-            word(one, "id"),
-            format!("{} {} {by:?}", word(one, "verdict"), word(one, "not_decided")),
-        )
+    let ids: BTreeSet<String> = list(result, "tests").iter().map(|test| word(test, "id")).collect();
+    let requirements = list(result, "requirements").iter().filter_map(|one| {
+        let all = list(one, "decided_by").iter().filter_map(Value::as_str);
+        let by: BTreeSet<&str> = all.filter(|by| ids.contains(*by)).collect();
+        let (verdict, why) = (word(one, "verdict"), word(one, "not_decided"));
+        (verdict == "fail" || !by.is_empty()).then(|| (word(one, "id"), format!("{verdict} {why} {by:?}")))
     });
-    let monitors = list(result, "monitors")
-        .iter()
-        .map(|one| (word(one, "id"), word(one, "verdict")));
+    let monitors = list(result, "monitors").iter();
+    let monitors = monitors.map(|one| (word(one, "id"), word(one, "verdict")));
+    let monitors = monitors.filter(|(_, verdict)| ["fail", "warning"].contains(&verdict.as_str()));
     let verdict = ("verdict".to_owned(), word(result, "verdict"));
     [
         [verdict].into(),

@@ -148,7 +148,8 @@ impl Continuity {
             // A number that was left out may be the farewell, or the start, by which an order was forgotten.
             let is_skipped = before.zip(id).is_some_and(|(before, id)| id > next(before));
             let reset = self.reset.take().filter(|_| is_skipped);
-            let early = self.early.take().map(|early| early.since);
+            // What was under way at the first state may be so still.
+            let early = self.early.take_if(|_| is_skipped).map(|early| early.since);
             self.holes += u64::from(is_skipped);
             self.has_order = false;
             return match (reset, early) {

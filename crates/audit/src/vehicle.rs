@@ -159,14 +159,14 @@ impl Vehicle {
         let mut due = Vec::new();
         if self.timed {
             for sorted in self.sorted.values_mut() {
-                due.extend(sorted.due(at.moment));
+                due.extend(one_after_the_other(sorted.due(at.moment)));
             }
         }
         if stale || !self.timed {
             due.push(arrived);
         } else {
             let sorted = self.sorted.entry(name.to_owned()).or_default();
-            due.extend(sorted.take(id, at.moment, arrived));
+            due.extend(one_after_the_other(sorted.take(id, at.moment, arrived)));
         }
         due.sort_by_key(|arrived| arrived.at.moment);
         for arrived in due {
@@ -449,4 +449,14 @@ impl Vehicle {
             sides,
         }
     }
+}
+
+/// The messages of one topic in the order of their count: none came before the one that it follows.
+fn one_after_the_other(mut messages: Vec<Arrived>) -> Vec<Arrived> {
+    let mut last = Moment::default();
+    for arrived in &mut messages {
+        last = last.max(arrived.at.moment);
+        arrived.at.moment = last;
+    }
+    messages
 }

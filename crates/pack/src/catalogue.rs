@@ -158,7 +158,7 @@ impl Decided {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum VersionChange {
-    /// The same obligation in other words, such as another name of a member.
+    /// In other words, such as another name of a member, but with the obligation of before.
     Reworded,
     /// Another obligation about the same thing.
     Changed,

@@ -67,7 +67,7 @@ impl MessageSchema {
         })))
     }
 
-    /// The same schema where the messages of its topic are disputed.
+    /// This schema, where the messages of its topic are disputed.
     pub(super) fn with_errata(self, errata: Vec<Disputed>) -> Self {
         match Arc::try_unwrap(self.0) {
             Ok(compiled) => Self(Arc::new(Compiled { errata, ..compiled })),

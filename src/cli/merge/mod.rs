@@ -8,6 +8,7 @@ mod others;
 use std::path::{Component, Path, PathBuf};
 
 use super::args::{Format, Report};
+use super::bundle_state::{self, PARTS};
 use super::exit::Exit;
 use super::problem::Problem;
 use super::qualified;
@@ -20,8 +21,6 @@ use tck_report::{json as result_file, overview};
 use tck_result::{MergedPart, MergedRun, Part as _, RunResult};
 use tck_run::{Bundle, sources, write_joined, write_whole};
 
-/// The folder of a joined bundle that holds the results of its parts.
-pub(super) const PARTS: &str = "shards";
 /// The result of a bundle.
 const RESULT: &str = "result.json";
 /// How deep below a folder bundles are looked for.
@@ -115,7 +114,7 @@ pub(super) fn report(folder: &Path, arguments: &Report, library: &Library) -> Re
     if arguments.rejudge {
         return rejudge(folder, library, arguments.format);
     }
-    super::report::unchanged(folder)?;
+    bundle_state::unchanged(folder)?;
     let result = joined(library, &saved_parts(folder, folder)?)?;
     written(&result, folder, arguments, library)
 }
