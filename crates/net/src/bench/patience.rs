@@ -76,6 +76,14 @@ pub struct SecuredListener {
 impl SecuredListener {
     /// Serves on a port that is open already, and shows a certificate there.
     #[must_use]
+    #[cfg_attr(
+        not(feature = "tls"),
+        expect(
+            unused_variables,
+            unused_assignments,
+            reason = "without TLS nobody has a certificate"
+        )
+    )]
     pub fn new(listener: TcpListener, tls: TlsServer) -> Self {
         let address = listener.local_addr();
         let (sender, secured) = mpsc::channel(1);
