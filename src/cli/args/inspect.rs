@@ -17,7 +17,7 @@ Examples:
   vda5050-tck list requirements --changes 2.1.0..3.0.0
   vda5050-tck list hooks                   what a profile can do for a test
   vda5050-tck list language                the reference of the language of suites, as a page of Markdown
-  vda5050-tck list asyncapi --protocol 2.0.0   topics and messages for generators of code and documents";
+  vda5050-tck list asyncapi --protocol 2.0.0   topics and messages, for generators";
 
 /// `list`.
 #[derive(Clone, Debug, Args)]
@@ -139,7 +139,7 @@ Examples:
   vda5050-tck report --verify --root sha256:HASH DIR    is it the bundle that a certificate names?
   vda5050-tck report --certificate DIR > paper.html     two to four pages of A4 for a run of `certify`
   vda5050-tck report --attestation DIR > attestation.json   for a signer, such as cosign
-  vda5050-tck report --package run.zip DIR              for a customer or a laboratory, with all papers
+  vda5050-tck report --package run.zip DIR              all of it in one file, for a laboratory
   vda5050-tck report --as code-quality DIR > quality.json   for a pipeline; `run --as` writes it in every case
   vda5050-tck report --compare BEFORE AFTER             what became better or worse, or is lost
   vda5050-tck report --compare audits/monday audits/tuesday   audits, too; --verify and --as take them as well
@@ -179,10 +179,10 @@ pub struct Report {
     #[arg(long = "as", value_name = "KIND[=FILE]", value_parser = rendering::to_file_or_stdout,
         conflicts_with_all = ["verify", "rejudge", "certificate", "attestation", "compare"])]
     pub renderings: Vec<RenderedTo>,
-    /// Take keys of Xray and `TestRail` for junit-properties from this file as well, beside those of the profile
+    /// Take keys of test management for junit-properties from this file, too
     #[arg(long, value_name = "FILE", requires = "renderings")]
     pub keys: Option<PathBuf>,
-    /// Write one zip for a customer or a laboratory, and say first what a laboratory would refuse (docs/handover.md)
+    /// Write one zip for a customer or a laboratory, and say first what would be refused
     #[arg(long, value_name = "FILE",
         conflicts_with_all = ["verify", "rejudge", "message", "certificate", "attestation", "renderings", "compare", "merge"])]
     pub package: Option<PathBuf>,
