@@ -49,6 +49,11 @@ pub enum PackageError {
     Zip(#[from] zip::result::ZipError),
 }
 
+fn failed(path: &Path) -> impl FnOnce(io::Error) -> PackageError {
+    let path = path.to_owned();
+    move |source| PackageError::Io { path, source }
+}
+
 /// A bundle that was found to be what its manifest says, and what is written about it.
 #[derive(Clone, Copy, Debug)]
 pub struct Package<'a> {
@@ -115,18 +120,16 @@ impl Package<'_> {
     /// # Errors
     /// See [`PackageError`]; what was at that place is still there then.
     pub fn write(&self, file: &Path) -> Result<Vec<String>, PackageError> {
-        let failed = |path: &Path| {
-            let path = path.to_owned();
-            move |source| PackageError::Io { path, source }
-        };
         let beside = file.parent().filter(|folder| !folder.as_os_str().is_empty());
         let beside = beside.unwrap_or_else(|| Path::new("."));
-        std::fs::create_dir_all(beside).map_err(failed(beside))?;
-        let place = beside.canonicalize().map_err(failed(beside))?;
+        let there = beside.ancestors().find(|folder| folder.is_dir());
+        let there = there.unwrap_or_else(|| Path::new("."));
+        let place = there.canonicalize().map_err(failed(there))?;
         let bundle = self.folder.canonicalize().map_err(failed(self.folder))?;
         if place.starts_with(&bundle) {
             return Err(PackageError::Inside);
         }
+        std::fs::create_dir_all(beside).map_err(failed(beside))?;
         let papers = self.papers()?;
         let mut unfinished = file.as_os_str().to_owned();
         unfinished.push(".part");
@@ -142,10 +145,6 @@ impl Package<'_> {
     }
 
     fn fill(&self, path: &Path, papers: &[(&'static str, String)]) -> Result<(), PackageError> {
-        let failed = |path: &Path| {
-            let path = path.to_owned();
-            move |source| PackageError::Io { path, source }
-        };
         let mut zip = ZipWriter::new(File::create(path).map_err(failed(path))?);
         let options = SimpleFileOptions::default()
             .compression_method(CompressionMethod::Deflated)
@@ -178,7 +177,7 @@ impl Package<'_> {
         } = *self;
         let paper = |error: &dyn std::fmt::Display| PackageError::Paper(error.to_string());
         let path = folder.join(manifest::NAME);
-        let bytes = std::fs::read(&path).map_err(|source| PackageError::Io { path, source })?;
+        let bytes = std::fs::read(&path).map_err(failed(&path))?;
         let certificate = match certificate::render(result, sources, &manifest.root) {
             Ok(page) => Some(page),
             Err(error @ CertificateError::Template(_)) => return Err(paper(&error)),
