@@ -119,11 +119,10 @@ impl Attestation {
 /// tool. The subject is `manifest.json`.
 ///
 /// A property is a requirement that was decided and never found broken; a remark is none. `CONFORMS` is there when a run of `certify`
-/// broke nothing. Of a run that is not complete, is only a part, or had
-/// other suites, nothing is said to hold.
+/// broke nothing. Of a run that is not complete, is only a part, or had other suites, nothing is said to hold.
 #[must_use]
 pub fn simple(result: &RunResult, manifest: &[u8], root: &str) -> String {
-    let (tool, version) = result.tool.rsplit_once(' ').unwrap_or((&result.tool, ""));
+    let (tool, version) = result.tool.rsplit_once(' ').unwrap_or((result.tool.as_str(), ""));
     let scope = format!("VDA5050_{}_{}", result.protocol, result.role.to_ascii_uppercase());
     let whole = statement::trouble(result).is_none()
         && result.shard.is_none()

@@ -45,7 +45,7 @@ pub fn render(result: &RunResult, sources: &Sources, manifest: &Manifest) -> Str
         })
     });
     let [major, minor] = SPECIFICATION;
-    let (tool, version) = result.tool.rsplit_once(' ').unwrap_or((&result.tool, ""));
+    let (tool, version) = result.tool.rsplit_once(' ').unwrap_or((result.tool.as_str(), ""));
     let said = |name: &str| result.setting(name).map(|value| line(value).into_owned());
     let target = device(result);
     let mut subject = target.clone();
