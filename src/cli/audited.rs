@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::args::{Format, Rendering, Report};
 use super::exit::Exit;
-use super::outputs::Outputs;
+use super::outputs::{Content, Outputs};
 use super::problem::Problem;
 use tck_audit::result::AuditResult;
 use tck_audit::saved::{self, Lies};
@@ -28,7 +28,8 @@ pub fn report(folder: &Path, arguments: &Report, outputs: &Outputs<'_>) -> Resul
         let library = crate::assets::library(arguments.suites.own())?;
         return rendered(folder, &library, arguments, outputs);
     }
-    if arguments.rejudge || arguments.message.is_some() || arguments.certificate || arguments.attestation {
+    let papers = arguments.certificate || arguments.attestation || arguments.package.is_some();
+    if arguments.rejudge || arguments.message.is_some() || papers {
         let title = format!("{} is the bundle of an audit, which has no journal", folder.display());
         let hint = "an audit takes --verify, --compare and --as; `audit RECORDING` judges its recordings again";
         return Err(Diagnostic::whole("usage", title).hint(hint).into());
@@ -69,6 +70,14 @@ pub fn told((name, lies): &(String, Lies)) -> String {
 }
 
 fn rendered(folder: &Path, library: &Library, arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem> {
+    let refused = arguments
+        .renderings
+        .iter()
+        .find(|wanted| !is_for_audits(wanted.rendering));
+    if refused.is_some() || arguments.keys.is_some() {
+        let title = "an audit has no tests, and is written as junit, markdown, code-quality or sarif only";
+        return Err(Diagnostic::whole("usage", title).into());
+    }
     let found = Manifest::verify(folder).map_err(|error| Diagnostic::whole("manifest", error.to_string()))?;
     if !found.holds() {
         let title = format!(
@@ -82,17 +91,31 @@ fn rendered(folder: &Path, library: &Library, arguments: &Report, outputs: &Outp
     let pack = super::pack(library, None)?;
     let quoted = sources(library, &pack);
     let text = |rendering: Rendering| match rendering {
-        Rendering::Junit | Rendering::JunitRequirements => bundle::junit(&result),
         Rendering::Markdown => Ok(bundle::markdown(&result)),
         Rendering::CodeQuality => Ok(bundle::code_quality(&result)),
         Rendering::Sarif => Ok(bundle::sarif(&result, &quoted)),
+        _ => bundle::junit(&result).map_err(|error| error.to_string()),
     };
-    outputs.write_each(text).map_err(Problem::Environment)?;
+    outputs
+        .write_each(|rendering| text(rendering).map(Content::Text))
+        .map_err(Problem::Environment)?;
     for wanted in arguments.renderings.iter().filter(|wanted| wanted.file.is_none()) {
-        let text = text(wanted.rendering).map_err(|error| Problem::Environment(error.to_string()))?;
-        super::print(&text)?;
+        super::print(&text(wanted.rendering).map_err(Problem::Environment)?)?;
     }
     Ok(Exit::Conforms)
+}
+
+fn is_for_audits(rendering: Rendering) -> bool {
+    match rendering {
+        Rendering::Junit
+        | Rendering::JunitRequirements
+        | Rendering::Markdown
+        | Rendering::CodeQuality
+        | Rendering::Sarif => true,
+        Rendering::JunitProperties | Rendering::Ctrf | Rendering::Allure | Rendering::Cyclonedx | Rendering::Svr => {
+            false
+        }
+    }
 }
 
 /// Compares audits, each with the one before it.

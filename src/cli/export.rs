@@ -1,10 +1,12 @@
-//! `report --certificate`, `--attestation` and `--as`: papers about a bundle that has not been changed.
+//! `report --certificate`, `--attestation`, `--package` and `--as`: papers about a bundle that has not been changed.
 
 use std::path::Path;
 
-use super::args::Report;
+use serde_json::json;
+
+use super::args::{Format, Report};
 use super::exit::Exit;
-use super::outputs::{Outputs, Shown};
+use super::outputs::{Content, Outputs, Shown};
 use super::problem::Problem;
 use tck_base::diagnostic::Diagnostic;
 use tck_journal::file::{self, Recording};
@@ -12,7 +14,9 @@ use tck_judge as judge;
 use tck_judge::Library;
 use tck_report::attestation::Attestation;
 use tck_report::certificate::{self, CertificateError};
-use tck_report::{json, manifest};
+use tck_report::keys::Keys;
+use tck_report::package::{self, Package, PackageError};
+use tck_report::{json as result_file, manifest};
 use tck_result::RunResult;
 use tck_run::sources;
 
@@ -53,13 +57,65 @@ pub fn rendered(folder: &Path, library: &Library, arguments: &Report, outputs: &
         inconclusive: arguments.inconclusive,
         root: Some(&root),
         folder,
+        keys: match &arguments.keys {
+            Some(file) => keys(file)?,
+            None => Keys::default(),
+        },
     };
     outputs.write(&shown).map_err(Problem::Environment)?;
     for wanted in arguments.renderings.iter().filter(|wanted| wanted.file.is_none()) {
-        let text = shown.as_text(wanted.rendering);
-        super::print(&text.map_err(|error| Problem::Environment(error.to_string()))?)?;
+        if let Content::Text(text) = shown.content(wanted.rendering).map_err(Problem::Environment)? {
+            super::print(&text)?;
+        }
     }
     Ok(Exit::Conforms)
+}
+
+/// The keys of test management that stand in a file.
+fn keys(file: &Path) -> Result<Keys, Problem> {
+    let wrong = |why: String| Problem::from(Diagnostic::whole("keys", format!("{}: {why}", file.display())));
+    let text = std::fs::read_to_string(file).map_err(|error| wrong(error.to_string()))?;
+    Keys::of_file(&text).map_err(|error| wrong(error.to_string()))
+}
+
+/// Writes the package for a customer or a laboratory, and says first what a laboratory would refuse.
+pub fn package(folder: &Path, library: &Library, file: &Path, format: Format) -> Result<Exit, Problem> {
+    let (result, root) = intact(folder, library)?;
+    let pack = super::pack(library, Some(&result.protocol))?;
+    let manifest = manifest::Manifest::read(folder)
+        .map_err(|error| Problem::from(Diagnostic::whole("manifest", error.to_string())))?;
+    let package = Package {
+        folder,
+        result: &result,
+        sources: &sources(library, &pack),
+        manifest: &manifest,
+    };
+    let refused = package::refused(&result);
+    let notices = package::notices(&result);
+    if format == Format::Text {
+        let mut text = match refused.as_slice() {
+            [] => "a laboratory would refuse nothing that can be seen here\n".to_owned(),
+            some => format!("a laboratory would refuse:\n  - {}\n", some.join("\n  - ")),
+        };
+        text.extend(notices.iter().map(|notice| format!("{notice}\n")));
+        super::print(&text)?;
+    }
+    let papers = package.write(file).map_err(|error| match error {
+        PackageError::Inside => Problem::from(Diagnostic::whole("usage", error.to_string())),
+        error => Problem::Environment(error.to_string()),
+    })?;
+    let shown = file.display().to_string();
+    super::print(&match format {
+        Format::Text => format!(
+            "{shown}: the bundle, and {}\nroot    sha256:{root}\n",
+            papers.join(", ")
+        ),
+        Format::Json => format!(
+            "{}\n",
+            json!({ "package": shown, "root": format!("sha256:{root}"), "refused": refused, "notices": notices,
+                "papers": papers })
+        ),
+    })
 }
 
 /// The result of a bundle and its root hash, when every file is what the manifest says and the journal gives this result.
@@ -84,7 +140,8 @@ fn intact(folder: &Path, library: &Library) -> Result<(RunResult, String), Probl
         .map_err(|error| Problem::from(Diagnostic::whole("journal", format!("{}: {error}", folder.display()))))?;
     result.journal = file::name_of(&journal_path);
     let path = folder.join("result.json");
-    let saved = json::read(&path).map_err(|error| Problem::from(Diagnostic::whole("result", error.to_string())))?;
+    let saved =
+        result_file::read(&path).map_err(|error| Problem::from(Diagnostic::whole("result", error.to_string())))?;
     if saved != result {
         let title = format!("the journal does not give the result that is in {}", path.display());
         let hint = "`report --rejudge` shows what differs; another version of the tool may judge otherwise";

@@ -150,6 +150,10 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
                 .map_err(Problem::Environment)?
                 .into_iter(),
         ),
+        (Listing::Asyncapi, _) => {
+            let role = arguments.role.unwrap_or(Role::Agv);
+            format!("{:#}\n", tck_pack::asyncapi(&pack, role))
+        }
         (Listing::Vehicle, Format::Text) => ui::vehicle_words(VEHICLE_WORDS),
         (Listing::Vehicle, Format::Json) => lines(
             VEHICLE_WORDS

@@ -11,10 +11,12 @@ use super::exit::Exit;
 use super::pipeline;
 use super::problem::Problem;
 use tck_journal::tool;
-use tck_report::junit::{self, Flavour, JunitError};
+use tck_report::junit::{self, Flavour};
+use tck_report::keys::Keys;
+use tck_report::manifest::{self, Manifest};
 use tck_report::no_result::{NoResult, Obstacle};
 use tck_report::sources::Sources;
-use tck_report::{issues, markdown};
+use tck_report::{allure, attestation, clean, ctrf, cyclonedx, issues, markdown};
 use tck_result::RunResult;
 use tck_run::{forget_latest, write_whole};
 
@@ -138,13 +140,19 @@ impl Owed {
 
     fn write_no_result(&self, nothing: &NoResult) -> Result<(), Problem> {
         for wanted in &self.files {
-            let text = match wanted.rendering {
-                Rendering::Junit | Rendering::JunitRequirements => nothing.junit(),
-                Rendering::Markdown => Ok(nothing.markdown()),
-                Rendering::CodeQuality => Ok(issues::code_quality_of(nothing)),
-                Rendering::Sarif => Ok(issues::sarif_of(nothing)),
+            let content: Content = match wanted.rendering {
+                Rendering::Junit | Rendering::JunitRequirements | Rendering::JunitProperties => nothing
+                    .junit()
+                    .map_err(|error| Problem::Environment(error.to_string()))?
+                    .into(),
+                Rendering::Ctrf => ctrf::no_result(nothing).into(),
+                Rendering::Allure => Content::Folder(allure::no_result(nothing)),
+                Rendering::Markdown => nothing.markdown().into(),
+                Rendering::CodeQuality => issues::code_quality_of(nothing).into(),
+                Rendering::Sarif => issues::sarif_of(nothing).into(),
+                Rendering::Cyclonedx | Rendering::Svr => nothing.no_statement().into(),
             };
-            write(wanted, text).map_err(Problem::Environment)?;
+            write(wanted, Ok(content)).map_err(Problem::Environment)?;
         }
         Ok(())
     }
@@ -160,16 +168,31 @@ pub(super) struct Outputs<'a> {
 impl Outputs<'_> {
     /// Writes what came out of a run into every file.
     pub(super) fn write(&self, shown: &Shown<'_>) -> Result<(), String> {
-        self.write_each(|rendering| shown.as_text(rendering))
+        self.write_each(|rendering| shown.content(rendering))
     }
 
     /// Writes into every file what this makes of its kind.
-    pub(super) fn write_each(&self, text: impl Fn(Rendering) -> Result<String, JunitError>) -> Result<(), String> {
+    pub(super) fn write_each(&self, content: impl Fn(Rendering) -> Result<Content, String>) -> Result<(), String> {
         self.settled.set(true);
         for wanted in self.files {
-            write(wanted, text(wanted.rendering))?;
+            write(wanted, content(wanted.rendering))?;
         }
         Ok(())
+    }
+}
+
+/// What a rendering is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Content {
+    /// One text.
+    Text(String),
+    /// Files of a folder: name and text.
+    Folder(Vec<(String, String)>),
+}
+
+impl From<String> for Content {
+    fn from(text: String) -> Self {
+        Self::Text(text)
     }
 }
 
@@ -181,27 +204,83 @@ pub(super) struct Shown<'a> {
     pub(super) root: Option<&'a str>,
     /// The folder of the evidence.
     pub(super) folder: &'a Path,
+    /// Keys of test management beside those of the profile.
+    pub(super) keys: Keys,
 }
 
 impl Shown<'_> {
-    /// The run as a text of a kind.
-    pub(super) fn as_text(&self, rendering: Rendering) -> Result<String, JunitError> {
+    /// The run as a rendering of a kind.
+    pub(super) fn content(&self, rendering: Rendering) -> Result<Content, String> {
+        let (result, sources) = (self.result, self.sources);
+        let how = self.inconclusive.into();
         let flavour = Flavour {
-            inconclusive: self.inconclusive.into(),
+            inconclusive: how,
             root: self.root,
         };
-        match rendering {
-            Rendering::Junit => junit::render(self.result, flavour),
-            Rendering::JunitRequirements => junit::by_requirement(self.result, self.sources, flavour),
-            Rendering::Markdown => Ok(markdown::summary(self.result, self.sources, self.folder.to_str())),
-            Rendering::CodeQuality => Ok(issues::code_quality(self.result, self.sources)),
-            Rendering::Sarif => Ok(issues::sarif(self.result, self.sources)),
+        let text = match rendering {
+            Rendering::Junit => junit::render(result, flavour).map_err(|error| error.to_string())?,
+            Rendering::JunitRequirements => {
+                junit::by_requirement(result, sources, flavour).map_err(|error| error.to_string())?
+            }
+            Rendering::JunitProperties => {
+                let keys = Keys::of_run(result)
+                    .map_err(|error| error.to_string())?
+                    .under(self.keys.clone());
+                for id in keys.unmet(result) {
+                    super::tell(&format!(
+                        "nothing in this run is called `{}`: its key is not used",
+                        clean::line(id)
+                    ));
+                }
+                junit::with_keys(result, sources, &keys, flavour).map_err(|error| error.to_string())?
+            }
+            Rendering::Ctrf => ctrf::render(result, sources, how),
+            Rendering::Allure => return Ok(Content::Folder(allure::render(result, sources, how))),
+            Rendering::Markdown => markdown::summary(result, sources, self.folder.to_str()),
+            Rendering::CodeQuality => issues::code_quality(result, sources),
+            Rendering::Sarif => issues::sarif(result, sources),
+            Rendering::Cyclonedx => cyclonedx::render(result, sources, &self.manifest()?),
+            Rendering::Svr => {
+                let path = self.folder.join(manifest::NAME);
+                let bytes = std::fs::read(&path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+                attestation::simple(result, &bytes, &self.manifest()?.root)
+            }
+        };
+        Ok(text.into())
+    }
+
+    fn manifest(&self) -> Result<Manifest, String> {
+        Manifest::read(self.folder).map_err(|error| error.to_string())
+    }
+}
+
+fn write(wanted: &RenderedTo, content: Result<Content, String>) -> Result<(), String> {
+    let Some(file) = &wanted.file else { return Ok(()) };
+    match content? {
+        Content::Text(text) => write_whole(file, text.as_bytes()).map_err(|error| error.to_string()),
+        Content::Folder(files) => {
+            forget(file).map_err(|error| format!("cannot write {}: {error}", file.display()))?;
+            for (name, text) in files {
+                write_whole(&file.join(name), text.as_bytes()).map_err(|error| error.to_string())?;
+            }
+            Ok(())
         }
     }
 }
 
-fn write(wanted: &RenderedTo, text: Result<String, JunitError>) -> Result<(), String> {
-    let Some(file) = &wanted.file else { return Ok(()) };
-    let text = text.map_err(|error| error.to_string())?;
-    write_whole(file, text.as_bytes()).map_err(|error| error.to_string())
+/// Takes away what an earlier run has left in a folder of Allure, and nothing else: it would be shown beside this run.
+fn forget(folder: &Path) -> std::io::Result<()> {
+    let entries = match std::fs::read_dir(folder) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
+        entries => entries?,
+    };
+    for entry in entries {
+        let entry = entry?;
+        let name = entry.file_name();
+        let is_ours = |name: &str| name.starts_with(allure::BEGINS) && name.ends_with(allure::ENDS);
+        if name.to_str().is_some_and(is_ours) {
+            std::fs::remove_file(entry.path())?;
+        }
+    }
+    Ok(())
 }

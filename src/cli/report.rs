@@ -52,6 +52,9 @@ pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem
     if arguments.attestation {
         return super::export::attestation(folder, &library);
     }
+    if let Some(file) = &arguments.package {
+        return super::export::package(folder, &library, file, arguments.format);
+    }
     if merge::is_merged(folder) {
         return merge::report(folder, arguments, &library);
     }

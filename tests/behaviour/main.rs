@@ -18,6 +18,7 @@ mod exit_codes;
 mod exploring;
 mod following;
 mod handed_over;
+mod handing_over;
 mod histories;
 mod hooks;
 mod hostile;

@@ -4,6 +4,7 @@
 
 mod accessible;
 mod certificate;
+mod foreign;
 mod html;
 mod json;
 mod junit;

@@ -8,6 +8,7 @@
 #![warn(missing_docs)]
 
 mod assets;
+mod asyncapi;
 mod breakage;
 mod catalogue;
 mod catalogue_file;
@@ -28,6 +29,7 @@ mod version;
 mod tests;
 
 pub use assets::{AssetFile, Assets};
+pub use asyncapi::asyncapi;
 pub use breakage::{Breakage, BreakageScope, Way};
 pub use catalogue::{Catalogue, Decided, Mood, Requirement, RequirementId, Subject, VersionChange, VersionNote};
 pub use changes::{ChangeKind, RequirementChange};

@@ -295,6 +295,11 @@ impl Taken<'_> {
             value: format!("{} (until {})", known.reason, known.until),
             origin: origin.to_string(),
         }));
+        settings.extend(self.layer.issue_keys.iter().map(|(id, (key, origin))| Setting {
+            name: format!("keys.{id}"),
+            value: key.clone(),
+            origin: origin.to_string(),
+        }));
         settings.extend(self.layer.hooks.iter().map(|(name, (hook, origin))| {
             Setting {
                 name: format!("hooks.{name}"),

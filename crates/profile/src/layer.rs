@@ -45,6 +45,8 @@ pub(super) struct Layer {
     pub hooks: BTreeMap<String, (Hook, Origin)>,
     pub deviations: Vec<(Deviation, Origin)>,
     pub known: Vec<(KnownFailure, Origin)>,
+    /// What test management calls a requirement, test or monitor, by its id.
+    pub issue_keys: BTreeMap<String, (String, Origin)>,
 }
 
 impl Layer {
@@ -78,6 +80,7 @@ impl Layer {
             self.known.retain(|(lower, _)| lower.id != known.id);
             self.known.push((known, origin));
         }
+        self.issue_keys.extend(upper.issue_keys);
         self
     }
 

@@ -12,6 +12,7 @@ mod claim;
 mod effective;
 mod hook_action;
 mod hooks;
+mod issue_key;
 mod key;
 mod layer;
 mod load;
@@ -33,6 +34,7 @@ pub use claim::Claim;
 pub use effective::Effective;
 pub use hook_action::{Hook, HookAction, NATURAL_TRAFFIC, RESTART_DEVICE, START_DEVICE, STOP_DEVICE};
 pub use hooks::HookExample;
+pub use issue_key::IssueKey;
 pub use key::{
     COMMON_PLACEHOLDERS, FOUND, KEYS, Key, Kind, PASSWORD_VARIABLE, Place, SAMPLE_ACTIONS, STATEMENTS, SampleKind,
     Statement,

@@ -430,6 +430,18 @@ fn hooks_and_deviations_of_two_layers_add_up() {
 }
 
 #[test]
+fn keys_of_test_management_are_settings_with_their_origin_and_a_wrong_one_is_refused() {
+    let text = "[keys]\nORD-REJ-12 = \"PROJ-12\"\n\"order-rejection/lower-update-id\" = \"C1234\"\n";
+    let effective = check_text(text).expect("good");
+    assert_eq!(setting(&effective, "keys.ORD-REJ-12"), Some(("PROJ-12", "device.toml")));
+    let test = setting(&effective, "keys.order-rejection/lower-update-id");
+    assert_eq!(test, Some(("C1234", "device.toml")));
+    let wrong = check_text("[keys]\nA-1 = \"proj-12\"\nA-2 = 7\n").expect_err("refused");
+    let codes: Vec<&str> = wrong.iter().map(|one| one.code).collect();
+    assert_eq!(codes, ["bad-value", "wrong-type"]);
+}
+
+#[test]
 fn a_variable_that_sets_nothing_is_refused_with_the_one_that_was_meant() {
     let mut site = Site::new();
     let variable = ("VDA5050_TCK_BENCH_LISTN".to_owned(), "e:1".to_owned());

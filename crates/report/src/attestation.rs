@@ -6,7 +6,9 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
+use super::clean::line;
 use super::statement;
+use super::time::{finished, rfc3339};
 use tck_base::verdict::Verdict;
 use tck_journal::event::hex;
 use tck_result::RunResult;
@@ -15,6 +17,9 @@ use tck_result::RunResult;
 const STATEMENT: &str = "https://in-toto.io/Statement/v1";
 /// The type of what it says.
 const PREDICATE: &str = "https://in-toto.io/attestation/test-result/v0.1";
+
+/// The type of a statement of what was verified, and nothing else.
+const SIMPLE: &str = "https://in-toto.io/attestation/svr/v0.1";
 
 /// A statement about the bundle of a run.
 #[derive(Debug, Serialize)]
@@ -108,4 +113,49 @@ impl Attestation {
     pub fn to_json(&self) -> Result<String, serde_json::Error> {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }
+}
+
+/// A simple verification result: what a run has shown to hold, and nothing else, so that whoever admits a device need not know this
+/// tool. The subject is `manifest.json`.
+///
+/// A property is a requirement that was decided and never found broken; a remark is none. `CONFORMS` is there when a run of `certify`
+/// broke nothing. Of a run that is not complete, is only a part, or had other suites, nothing is said to hold.
+#[must_use]
+pub fn simple(result: &RunResult, manifest: &[u8], root: &str) -> String {
+    let (tool, version) = result.tool.rsplit_once(' ').unwrap_or((result.tool.as_str(), ""));
+    let scope = format!("VDA5050_{}_{}", result.protocol, result.role.to_ascii_uppercase());
+    let whole = statement::trouble(result).is_none()
+        && result.shard.is_none()
+        && result.mixed.is_none()
+        && !result.suites_modified
+        && !result.ran_out_of_time();
+    let conforms = matches!(result.verdict, Some(Verdict::Pass | Verdict::Warning)) && result.certifies();
+    let held = result
+        .requirements
+        .iter()
+        .filter(|requirement| requirement.verdict == Some(Verdict::Pass));
+    let mut properties: Vec<String> = Vec::new();
+    if whole {
+        properties.extend(conforms.then(|| format!("{scope}_CONFORMS")));
+        properties.extend(held.map(|requirement| format!("{scope}_{}", line(&requirement.id))));
+    }
+    let statement = json!({
+        "_type": STATEMENT,
+        "subject": [{
+            "name": super::manifest::NAME,
+            "digest": { "sha256": hex(&Sha256::digest(manifest)) },
+            "annotations": { "root": format!("sha256:{root}"), "device": statement::device(result) },
+        }],
+        "predicateType": SIMPLE,
+        "predicate": {
+            "verifier": {
+                "id": format!("{}@{}", env!("CARGO_PKG_REPOSITORY"), line(version)),
+                "name": line(tool),
+                "policy": { "name": "suites", "digest": { "sha256": line(&result.suites_sha256) } },
+            },
+            "timeCreated": rfc3339(finished(result)),
+            "properties": properties,
+        },
+    });
+    format!("{statement:#}\n")
 }

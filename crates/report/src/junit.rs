@@ -6,31 +6,28 @@
 //! one for the monitors, and one for the run itself: a run that ended early or decided nothing must not be
 //! green only because nothing failed.
 //!
-//! `junit_report` writes text as it comes, so everything goes through [`attribute`] or [`cdata`] first. What
+//! `junit_report` writes text as it comes, so everything goes through [`xml`] first. What
 //! it cannot do: more than one `<failure>` in a test case (the worst decision gives type and message, all
-//! of them stand in its text), and a `skipped` count on the suite; [`with_properties`] adds the properties. It always
+//! of them stand in its text), and a `skipped` count on the suite; [`properties`] writes the properties. It always
 //! writes a timestamp: ours is the start of the run, and its constructors that read the clock are not used. No test case
 //! has a `file`, which the schema of Jenkins' xUnit plugin forbids.
 
-use std::fmt::Write as _;
+mod properties;
+mod xml;
 
 use junit_report::{Duration, OffsetDateTime, ReportBuilder, TestCase, TestResult as Outcome, TestSuite};
 
-use askama::filters::Escaper as _;
-
-use super::clean;
-use super::findings::{Finding, PROGRAM, findings};
-use super::html::Escape;
-use super::repeated;
+use super::cases::{self, Case};
+use super::findings::{Finding, findings};
+use super::keys::Keys;
 use super::sources::Sources;
 use super::statement::{self, Gap};
+use super::time::{millis, started};
 use tck_base::verdict::Verdict;
-use tck_result::{Decision, MonitorResult, RequirementResult, RunResult, TestResult};
+use tck_result::{RequirementResult, RunResult};
+use xml::{attribute, cdata, with_tags};
 
-/// The suite that is about the run itself.
-pub const RUN_SUITE: &str = "run";
-/// The case of that suite.
-pub const RUN_CASE: &str = "the run is complete and decided something";
+pub use super::cases::{RUN_CASE, RUN_SUITE};
 
 /// Why no JUnit file could be made.
 #[derive(Debug, thiserror::Error)]
@@ -61,63 +58,44 @@ pub struct Flavour<'a> {
 /// # Errors
 /// When the XML writer refuses; it has no reason to.
 pub fn render(result: &RunResult, flavour: Flavour<'_>) -> Result<String, JunitError> {
-    let how = flavour.inconclusive;
-    let mut report = ReportBuilder::new();
-    report.add_testsuite(suite(result, RUN_SUITE, run_cases(result)));
-    let mut groups: Vec<(&str, Vec<TestCase>)> = Vec::new();
-    for test in &result.tests {
-        let group = test.id.split_once('/').map_or("tests", |(group, _)| group);
-        let case = test_case(test, how);
-        match groups.iter_mut().find(|(name, _)| *name == group) {
-            Some((_, cases)) => cases.push(case),
-            None => groups.push((group, vec![case])),
-        }
-    }
-    for (group, cases) in groups {
-        report.add_testsuite(suite(result, group, cases));
-    }
-    if !result.monitors.is_empty() {
-        let cases = result
-            .monitors
-            .iter()
-            .map(|monitor| monitor_case(monitor, how))
-            .collect();
-        report.add_testsuite(suite(result, "monitors", cases));
-    }
-    written(&report, result, flavour)
+    let quoted = Sources::default();
+    let all = cases::cases(result, &quoted);
+    Ok(lines(&of_cases(result, &all, flavour)?))
 }
 
-/// What is about the run itself: whether it came to its end, whether its program did so by itself, and who was judged.
-fn run_cases(result: &RunResult) -> Vec<TestCase> {
-    let mut all = vec![run_case(result)];
-    if let Some(program) = &result.program {
-        let story = program.story().unwrap_or_default();
-        let verdict = program.verdict().or(Some(Verdict::Pass));
-        let words = program.first().map_or("", |end| end.words.as_str());
-        all.push(
-            Case {
-                name: "the program that was started ran until it was ended",
-                class: "run",
-                seconds: 0.0,
-                outcome: outcome(verdict, PROGRAM, &story, words, Inconclusive::Error),
-                out: None,
-            }
-            .build(),
-        );
+/// The result as JUnit XML with properties: what a case is about, and under which key test management knows it. A requirement
+/// that is known there as a test has a case of its own.
+///
+/// The schema of Jenkins' xUnit plugin allows a case no properties.
+///
+/// # Errors
+/// When the XML writer refuses; it has no reason to.
+pub fn with_keys(
+    result: &RunResult,
+    sources: &Sources,
+    keys: &Keys,
+    flavour: Flavour<'_>,
+) -> Result<String, JunitError> {
+    let mut all = cases::cases(result, sources);
+    let found = findings(result, sources);
+    let own = result.requirements.iter().filter(|one| keys.is_test(&one.id));
+    all.extend(own.map(|one| {
+        let finding = found.iter().find(|finding| finding.requirement == one.id);
+        requirement_case(one, properties::REQUIREMENTS, finding, sources)
+    }));
+    let xml = of_cases(result, &all, flavour)?;
+    Ok(lines(&properties::of_cases(&xml, &all, keys)))
+}
+
+/// These cases as JUnit XML, a suite for all that stand together.
+fn of_cases(result: &RunResult, all: &[Case<'_>], flavour: Flavour<'_>) -> Result<String, JunitError> {
+    let mut report = ReportBuilder::new();
+    for suite_cases in all.chunk_by(|one, next| one.suite == next.suite) {
+        let name = suite_cases.first().map_or("", |case| case.suite);
+        let built = suite_cases.iter().map(|case| built(case, flavour.inconclusive));
+        report.add_testsuite(suite(result, name, built.collect()));
     }
-    if let Some(why) = &result.mixed {
-        all.push(
-            Case {
-                name: "nobody else was taken for the device",
-                class: "run",
-                seconds: 0.0,
-                outcome: outcome(Some(Verdict::Inconclusive), "", why, "", Inconclusive::Error),
-                out: None,
-            }
-            .build(),
-        );
-    }
-    all
+    Ok(properties::of_run(&written(&report)?, result, flavour.root))
 }
 
 /// The result as JUnit XML: a case for each requirement, and a suite for each group of requirements.
@@ -126,22 +104,19 @@ fn run_cases(result: &RunResult) -> Vec<TestCase> {
 /// When the XML writer refuses; it has no reason to.
 pub fn by_requirement(result: &RunResult, sources: &Sources, flavour: Flavour<'_>) -> Result<String, JunitError> {
     let found = findings(result, sources);
-    let mut report = ReportBuilder::new();
-    report.add_testsuite(suite(result, RUN_SUITE, run_cases(result)));
-    let mut groups: Vec<(&str, Vec<TestCase>)> = Vec::new();
+    let mut all = cases::of_run(result);
+    let mut groups: Vec<(&str, Vec<Case<'_>>)> = Vec::new();
     for requirement in &result.requirements {
         let group = requirement.id.rsplit_once('-').map_or("other", |(group, _)| group);
         let finding = found.iter().find(|finding| finding.requirement == requirement.id);
-        let case = requirement_case(requirement, group, finding, sources, flavour.inconclusive);
+        let case = requirement_case(requirement, group, finding, sources);
         match groups.iter_mut().find(|(name, _)| *name == group) {
             Some((_, cases)) => cases.push(case),
             None => groups.push((group, vec![case])),
         }
     }
-    for (group, cases) in groups {
-        report.add_testsuite(suite(result, group, cases));
-    }
-    written(&report, result, flavour)
+    all.extend(groups.into_iter().flat_map(|(_, cases)| cases));
+    Ok(lines(&of_cases(result, &all, flavour)?))
 }
 
 /// A case of something that is no run.
@@ -165,14 +140,15 @@ pub fn plain(cases: &[Plain]) -> Result<String, JunitError> {
     let mut groups: Vec<(&str, Vec<TestCase>)> = Vec::new();
     for case in cases {
         let message = case.text.lines().next().unwrap_or_default();
-        let built = Case {
-            name: &case.name,
-            class: &case.suite,
-            seconds: 0.0,
-            outcome: outcome(case.verdict, &case.name, message, &case.text, Inconclusive::Error),
-            out: (case.verdict == Some(Verdict::Warning)).then(|| format!("warning: {}", case.text)),
-        }
-        .build();
+        let built = TestCase {
+            name: attribute(&case.name),
+            time: duration(0.0),
+            result: outcome(case.verdict, &case.name, message, &case.text, Inconclusive::Error),
+            classname: Some(attribute(&case.suite)),
+            filepath: None,
+            system_out: (case.verdict == Some(Verdict::Warning)).then(|| cdata(&format!("warning: {}", case.text))),
+            system_err: None,
+        };
         match groups.last_mut().filter(|(name, _)| *name == case.suite) {
             Some((_, cases)) => cases.push(built),
             None => groups.push((&case.suite, vec![built])),
@@ -190,17 +166,13 @@ pub fn plain(cases: &[Plain]) -> Result<String, JunitError> {
             system_err: None,
         });
     }
-    Ok(lines(&xml(&report)?))
+    Ok(lines(&written(&report)?))
 }
 
-fn written(report: &ReportBuilder, result: &RunResult, flavour: Flavour<'_>) -> Result<String, JunitError> {
-    Ok(lines(&with_properties(&xml(report)?, result, flavour)))
-}
-
-fn xml(report: &ReportBuilder) -> Result<String, JunitError> {
+fn written(report: &ReportBuilder) -> Result<String, JunitError> {
     let mut xml = Vec::new();
-    let written = report.build().write_xml(&mut xml);
-    written.map_err(|error| JunitError(error.to_string()))?;
+    let done = report.build().write_xml(&mut xml);
+    done.map_err(|error| JunitError(error.to_string()))?;
     let xml = String::from_utf8(xml).map_err(|error| JunitError(error.to_string()))?;
     Ok(with_times(&xml))
 }
@@ -212,105 +184,24 @@ fn lines(xml: &str) -> String {
 }
 
 /// Gives every time at most three decimals, as the schema of Jenkins' xUnit plugin has it. The writer prints sums of binary
-/// fractions, such as `1.9969999999999999`. Only tags are touched: the writer escapes `>` and `"` in their attributes, and
-/// what stands in CDATA sections is not ours.
+/// fractions, such as `1.9969999999999999`.
 fn with_times(xml: &str) -> String {
-    const CDATA: &str = "<![CDATA[";
-    let mut text = String::with_capacity(xml.len());
-    let mut rest = xml;
-    while let Some(begin) = rest.find('<') {
-        let is_data = rest[begin..].starts_with(CDATA);
-        let close = if is_data { "]]>" } else { ">" };
-        let Some(length) = rest[begin..].find(close) else { break };
-        let end = begin + length + close.len();
-        text.push_str(&rest[..begin]);
-        let tag = &rest[begin..end];
-        match tag.split_once(" time=\"").filter(|_| !is_data) {
-            Some((before, after)) => {
-                let (time, after) = after.split_once('"').unwrap_or((after, ""));
-                let rounded = time.parse::<f64>().map_or(0.0, |time| (time * 1000.0).round() / 1000.0);
-                // Writing to a text does not fail.
-                let _ = write!(text, "{before} time=\"{rounded}\"{after}");
-            }
-            None => text.push_str(tag),
-        }
-        rest = &rest[end..];
-    }
-    text + rest
+    with_tags(xml, |tag| {
+        let (before, after) = tag.split_once(" time=\"")?;
+        let (time, after) = after.split_once('"').unwrap_or((after, ""));
+        let rounded = time.parse::<f64>().map_or(0.0, |time| (time * 1000.0).round() / 1000.0);
+        Some(format!("{before} time=\"{rounded}\"{after}"))
+    })
 }
 
-/// Puts what is known of the run into the first suite, which is about the run. The writer escapes `>` in attributes, so
-/// that the first one ends the tag.
-fn with_properties(xml: &str, result: &RunResult, flavour: Flavour<'_>) -> String {
-    let Some(begin) = xml.find("<testsuite ") else {
-        return xml.to_owned();
-    };
-    let Some(end) = xml[begin..].find('>').map(|at| begin + at + 1) else {
-        return xml.to_owned();
-    };
-    let device = &result.device;
-    let root = flavour.root.map(|root| format!("sha256:{root}"));
-    let shard = result.shard.as_ref();
-    let origin = shard.map(|shard| shard.origin.as_str());
-    let shard = shard.map(|shard| format!("{}/{}", shard.index, shard.of));
-    let parts = result.merged.as_ref().map(|merged| {
-        let own = merged.parts.iter().filter(|part| part.counts).count();
-        format!("{own} of {}", merged.of)
-    });
-    let all = [
-        ("tool", Some(result.tool.as_str())),
-        ("run", Some(&result.run)),
-        ("mode", result.mode.as_deref()),
-        ("verdict", result.verdict.map(Verdict::word)),
-        ("role", Some(&result.role)),
-        ("protocol", Some(&result.protocol)),
-        ("manufacturer", Some(&device.manufacturer)),
-        ("serialNumber", Some(&device.serial_number)),
-        ("firmwareVersion", result.setting("certificate.firmware-version")),
-        ("suites", Some(&result.suites_sha256)),
-        ("shard", shard.as_deref()),
-        ("shardOrigin", origin),
-        ("parts", parts.as_deref()),
-        ("root", root.as_deref()),
-    ];
-    let mut properties = String::from("<properties>");
-    for (name, value) in all.iter().filter_map(|(name, value)| Some((name, (*value)?))) {
-        let mut escaped = String::new();
-        // Writing to a text does not fail.
-        let _ = Escape.write_escaped_str(&mut escaped, &attribute(value));
-        let _ = write!(properties, "<property name=\"{name}\" value=\"{escaped}\"/>");
-    }
-    properties += "</properties>";
-    format!("{}{properties}{}", &xml[..end], &xml[end..])
-}
-
-/// One line, without anything XML forbids. Escaping is done by the writer.
-fn attribute(text: &str) -> String {
-    // Line breaks would be folded to blanks by the next parser anyway.
-    clean::line(&text.replace(['\n', '\t'], " ")).into_owned()
-}
-
-/// Many lines, without anything XML forbids and without an end of the CDATA section they will stand in.
-fn cdata(text: &str) -> String {
-    clean::block(text).replace("]]>", "]] >")
-}
-
-/// Sums of these are made by the writer, which must not overflow.
+/// In whole milliseconds: what is finer is noise, and reads badly.
 fn duration(seconds: f64) -> Duration {
-    let seconds = if seconds.is_finite() {
-        seconds.clamp(0.0, 1e9)
-    } else {
-        0.0
-    };
-    // Whole milliseconds: what is finer is noise, and reads badly.
-    #[expect(clippy::cast_possible_truncation, reason = "clamped above")]
-    Duration::milliseconds((seconds * 1000.0).round() as i64)
+    Duration::milliseconds(i64::try_from(millis(seconds)).unwrap_or_default())
 }
 
-/// The start of the run; the epoch when it cannot be read.
+/// The start of the run.
 fn timestamp(result: &RunResult) -> OffsetDateTime {
-    let started = result.started.parse::<jiff::Timestamp>().ok();
-    let nanos = started.map_or(0, |started| started.as_nanosecond().max(0));
+    let nanos = started(result).as_nanosecond().max(0);
     OffsetDateTime::from_unix_timestamp_nanos(nanos).unwrap_or(OffsetDateTime::UNIX_EPOCH)
 }
 
@@ -327,25 +218,16 @@ fn suite(result: &RunResult, name: &str, testcases: Vec<TestCase>) -> TestSuite 
     }
 }
 
-struct Case<'a> {
-    name: &'a str,
-    class: &'a str,
-    seconds: f64,
-    outcome: Outcome,
-    out: Option<String>,
-}
-
-impl Case<'_> {
-    fn build(self) -> TestCase {
-        TestCase {
-            name: attribute(self.name),
-            time: duration(self.seconds),
-            result: self.outcome,
-            classname: Some(attribute(self.class)),
-            filepath: None,
-            system_out: self.out.map(|text| cdata(&text)),
-            system_err: None,
-        }
+fn built(case: &Case<'_>, how: Inconclusive) -> TestCase {
+    let how = if case.of_run() { Inconclusive::Error } else { how };
+    TestCase {
+        name: attribute(&case.name),
+        time: duration(case.seconds),
+        result: outcome(case.verdict, case.kind, &case.message, &case.details, how),
+        classname: Some(attribute(case.suite)),
+        filepath: None,
+        system_out: case.remark.as_deref().map(cdata),
+        system_err: None,
     }
 }
 
@@ -378,135 +260,14 @@ fn outcome(verdict: Option<Verdict>, kind: &str, message: &str, cause: &str, how
     }
 }
 
-fn run_case(result: &RunResult) -> TestCase {
-    let trouble = statement::trouble(result);
-    let statement = statement::statement(result);
-    Case {
-        name: RUN_CASE,
-        class: RUN_SUITE,
-        seconds: 0.0,
-        outcome: trouble.as_deref().map_or(Outcome::Success, |reason| {
-            outcome(Some(Verdict::Error), "", reason, &statement, Inconclusive::Error)
-        }),
-        out: trouble.is_none().then_some(statement),
-    }
-    .build()
-}
-
-fn test_case(test: &TestResult, how: Inconclusive) -> TestCase {
-    let verdict = statement::test_verdict(test);
-    let worst = test
-        .decisions
-        .iter()
-        .filter(|decision| Some(decision.verdict()) == verdict)
-        .collect::<Vec<_>>();
-    let kind = worst.first().map_or("", |decision| decision.requirement.as_str());
-    let message = match (&test.not_applicable, &test.reason, worst.first()) {
-        (Some(why), _, _) if verdict.is_none() => why.as_str(),
-        (_, Some(reason), _) => reason.as_str(),
-        (_, None, Some(decision)) => decision.message.as_str(),
-        (_, None, None) => "the test decided nothing",
-    };
-    let repeated = repeated::summary(test);
-    let message = match &repeated {
-        Some(repeated) if test.is_flaky() => &format!("{repeated}: {message}"),
-        _ => message,
-    };
-    let mut findings: Vec<&Decision> = test.decisions.iter().filter(|d| d.verdict() != Verdict::Pass).collect();
-    findings.sort_by_key(|decision| std::cmp::Reverse(decision.verdict()));
-    let details = findings
-        .iter()
-        .map(|decision| finding(decision))
-        .collect::<Vec<_>>()
-        .join("\n\n");
-    Case {
-        name: &test.id,
-        class: test.id.split_once('/').map_or("tests", |(group, _)| group),
-        seconds: test.seconds,
-        outcome: outcome(verdict, kind, message, &details, how),
-        out: match verdict {
-            Some(Verdict::Warning) => Some(format!("warning: {message}\n\n{details}")),
-            _ => repeated,
-        },
-    }
-    .build()
-}
-
-fn finding(decision: &Decision) -> String {
-    let verdict = decision.verdict();
-    let Decision {
-        requirement,
-        clause,
-        place,
-        message,
-        ..
-    } = decision;
-    let mut text = format!("{verdict}: {requirement}: {message}\n{clause} at {place}");
-    if let Some(sent) = &decision.sent {
-        let _ = write!(text, "\nsent: {sent}");
-    }
-    if let Some(witness) = decision.witness {
-        let _ = write!(text, "\ndecided by message #{witness}");
-    }
-    if let Some(nearest) = &decision.nearest {
-        let _ = write!(
-            text,
-            "\nclosest: #{} {}: {} (expected {})",
-            nearest.seq, nearest.path, nearest.found, nearest.expected
-        );
-    }
-    if let Some(explanation) = &decision.explanation {
-        text.push('\n');
-        text.push_str(explanation);
-    }
-    text
-}
-
-fn monitor_case(monitor: &MonitorResult, how: Inconclusive) -> TestCase {
-    let mut findings: Vec<_> = monitor.findings.iter().collect();
-    findings.sort_by_key(|finding| std::cmp::Reverse(finding.verdict));
-    let kind = findings.first().map_or("", |finding| finding.requirement.as_str());
-    let message = match (findings.first(), monitor.verdict) {
-        (Some(finding), Some(_)) => finding.message.as_str(),
-        (_, None) => "there was nothing to judge",
-        (None, Some(_)) => monitor.title.as_str(),
-    };
-    let lines = findings
-        .iter()
-        .map(|finding| {
-            let first = finding
-                .first
-                .iter()
-                .map(|seq| format!("#{seq}"))
-                .collect::<Vec<_>>()
-                .join(", ");
-            format!(
-                "{}: {}: {} ({} times; first at {first})",
-                finding.verdict, finding.requirement, finding.message, finding.count
-            )
-        })
-        .collect::<Vec<_>>()
-        .join("\n");
-    Case {
-        name: &monitor.id,
-        class: "monitors",
-        seconds: 0.0,
-        outcome: outcome(monitor.verdict, kind, message, &lines, how),
-        out: (monitor.verdict == Some(Verdict::Warning)).then_some(lines),
-    }
-    .build()
-}
-
-fn requirement_case(
-    requirement: &RequirementResult,
-    group: &str,
+fn requirement_case<'a>(
+    requirement: &'a RequirementResult,
+    suite: &'a str,
     finding: Option<&Finding<'_>>,
-    sources: &Sources,
-    how: Inconclusive,
-) -> TestCase {
+    sources: &'a Sources,
+) -> Case<'a> {
     let known = sources.requirement(&requirement.id);
     let asks = known.map_or("", |known| known.text.as_str());
-    // The schema of Jenkins' xUnit plugin allows a case no properties.
     let link = known.and_then(|known| known.link.as_deref());
     let link = link.map_or_else(String::new, |link| format!("\n{link}"));
     // What applies and was not decided is no pass, and what no test can decide is nobody's fault.
@@ -515,18 +276,23 @@ fn requirement_case(
         _ => requirement.verdict,
     };
     let gap = requirement.not_decided.as_ref().map(ToString::to_string);
-    let message = match (finding, &gap) {
-        (Some(finding), _) => finding.seen.as_str(),
-        (None, Some(why)) => why.as_str(),
-        (None, None) => "no test came to a decision",
+    let message = match (finding, gap) {
+        (Some(finding), _) => finding.seen.clone(),
+        (None, Some(why)) => why,
+        (None, None) => "no test came to a decision".to_owned(),
     };
     let by = format!("{asks}{link}\ndecided by {}", requirement.decided_by.join(", "));
     Case {
-        name: &format!("{} {asks}", requirement.id),
-        class: group,
+        suite,
+        name: format!("{} {asks}", requirement.id),
+        title: asks,
         seconds: 0.0,
-        outcome: outcome(verdict, &requirement.id, message, &by, how),
-        out: (verdict == Some(Verdict::Warning)).then(|| format!("warning: {message}\n\n{by}")),
+        verdict,
+        kind: &requirement.id,
+        remark: (verdict == Some(Verdict::Warning)).then(|| format!("warning: {message}\n\n{by}")),
+        message,
+        details: by,
+        requirements: vec![&requirement.id],
+        test: None,
     }
-    .build()
 }

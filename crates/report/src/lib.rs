@@ -7,11 +7,15 @@
 #![warn(missing_docs)]
 
 pub mod advice;
+pub mod allure;
 pub mod attestation;
+pub mod cases;
 pub mod certificate;
 pub mod clean;
 pub mod compare;
 pub mod coverage;
+pub mod ctrf;
+pub mod cyclonedx;
 pub mod findings;
 pub mod fleet;
 pub mod headline;
@@ -19,15 +23,18 @@ pub mod html;
 pub mod issues;
 pub mod json;
 pub mod junit;
+pub mod keys;
 pub mod known;
 pub mod manifest;
 pub mod markdown;
 pub mod no_result;
 pub mod overview;
+pub mod package;
 pub mod repeated;
 pub mod sequence;
 pub mod side_by_side;
 pub mod sources;
 pub mod statement;
 pub mod text;
+pub mod time;
 pub mod undecided;

@@ -3,8 +3,11 @@
 
 use std::fmt::Write as _;
 
+use serde_json::json;
+
+use super::cases::{Case, RUN_CASE, RUN_SUITE};
 use super::clean::{block, line};
-use super::junit::{self, JunitError, Plain, RUN_CASE, RUN_SUITE};
+use super::junit::{self, JunitError, Plain};
 use super::markdown::escaped;
 use tck_base::verdict::Verdict;
 
@@ -35,20 +38,54 @@ pub struct Obstacle {
 }
 
 impl NoResult {
+    fn titles(&self) -> String {
+        let titles: Vec<&str> = self.problems.iter().map(|problem| problem.title.as_str()).collect();
+        titles.join("; ")
+    }
+
+    fn texts(&self) -> String {
+        let texts: Vec<&str> = self.problems.iter().map(|problem| problem.text.as_str()).collect();
+        texts.join("\n\n")
+    }
+
+    /// The case of the run, red.
+    pub(super) fn case(&self) -> Case<'_> {
+        Case {
+            suite: RUN_SUITE,
+            name: RUN_CASE.to_owned(),
+            title: "",
+            seconds: 0.0,
+            verdict: Some(Verdict::Error),
+            kind: "",
+            message: self.titles(),
+            details: self.texts(),
+            remark: None,
+            requirements: Vec::new(),
+            test: None,
+        }
+    }
+
     /// JUnit XML: the case of the run, red.
     ///
     /// # Errors
     /// When the XML writer refuses; it has no reason to.
     pub fn junit(&self) -> Result<String, JunitError> {
-        let titles: Vec<&str> = self.problems.iter().map(|problem| problem.title.as_str()).collect();
-        let texts: Vec<&str> = self.problems.iter().map(|problem| problem.text.as_str()).collect();
         junit::plain(&[Plain {
             suite: RUN_SUITE.to_owned(),
             name: RUN_CASE.to_owned(),
             verdict: Some(Verdict::Error),
             // The first line becomes the message of the case.
-            text: format!("{}\n\n{}", titles.join("; "), texts.join("\n\n")),
+            text: format!("{}\n\n{}", self.titles(), self.texts()),
         }])
+    }
+
+    /// JSON in the place of a statement: no reader of statements takes it for one.
+    #[must_use]
+    pub fn no_statement(&self) -> String {
+        let nothing = json!({
+            "noResult": { "tool": line(&self.tool), "exit": self.exit, "meaning": line(&self.meaning), "why": line(&self.titles()) },
+        });
+        format!("{nothing:#}\n")
     }
 
     /// Markdown for a summary page.

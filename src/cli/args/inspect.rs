@@ -16,7 +16,8 @@ Examples:
   vda5050-tck list coverage --uncovered    what nothing decides
   vda5050-tck list requirements --changes 2.1.0..3.0.0
   vda5050-tck list hooks                   what a profile can do for a test
-  vda5050-tck list language                the reference of the language of suites, as a page of Markdown";
+  vda5050-tck list language                the reference of the language of suites, as a page of Markdown
+  vda5050-tck list asyncapi --protocol 2.0.0   topics and messages, for generators";
 
 /// `list`.
 #[derive(Clone, Debug, Args)]
@@ -73,6 +74,8 @@ pub enum Listing {
     Vehicle,
     /// Everything that a suite can say: keys, operators, variables, checks
     Language,
+    /// Topics and messages, as an `AsyncAPI` 3 document
+    Asyncapi,
 }
 
 const EXPLAIN_HELP: &str = "\
@@ -136,6 +139,7 @@ Examples:
   vda5050-tck report --verify --root sha256:HASH DIR    is it the bundle that a certificate names?
   vda5050-tck report --certificate DIR > paper.html     two to four pages of A4 for a run of `certify`
   vda5050-tck report --attestation DIR > attestation.json   for a signer, such as cosign
+  vda5050-tck report --package run.zip DIR              all of it in one file, for a laboratory
   vda5050-tck report --as code-quality DIR > quality.json   for a pipeline; `run --as` writes it in every case
   vda5050-tck report --compare BEFORE AFTER             what became better or worse, or is lost
   vda5050-tck report --compare audits/monday audits/tuesday   audits, too; --verify and --as take them as well
@@ -170,11 +174,18 @@ pub struct Report {
     /// Print an in-toto statement about the bundle, ready to be signed
     #[arg(long, conflicts_with_all = ["verify", "rejudge", "certificate"])]
     pub attestation: bool,
-    /// Print it for a pipeline, or write it into a file, as junit, junit-requirements, markdown, code-quality or sarif; may be
-    /// repeated
+    /// Print it for others' tools, or write it into a file: junit, junit-requirements, junit-properties, ctrf, allure, markdown,
+    /// code-quality, sarif, cyclonedx or svr; may be repeated (docs/handover.md)
     #[arg(long = "as", value_name = "KIND[=FILE]", value_parser = rendering::to_file_or_stdout,
         conflicts_with_all = ["verify", "rejudge", "certificate", "attestation", "compare"])]
     pub renderings: Vec<RenderedTo>,
+    /// Take keys of test management for junit-properties from this file, too
+    #[arg(long, value_name = "FILE", requires = "renderings")]
+    pub keys: Option<PathBuf>,
+    /// Write one zip for a customer or a laboratory, and say first what would be refused
+    #[arg(long, value_name = "FILE",
+        conflicts_with_all = ["verify", "rejudge", "message", "certificate", "attestation", "renderings", "compare", "merge"])]
+    pub package: Option<PathBuf>,
     /// How JUnit XML shows what was not decided
     #[arg(long, value_name = "HOW", value_enum, default_value_t)]
     pub inconclusive: InconclusiveArg,

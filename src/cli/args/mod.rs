@@ -82,7 +82,7 @@ pub enum Command {
     Run(Run),
     /// Test a device with nothing left to choose: all applicable tests, default timings, built-in suites
     Certify(Certify),
-    /// Show what there is: tests, requirements, coverage, monitors, faults, tolerances or hooks
+    /// Show what there is: tests, requirements, coverage, monitors, faults, tolerances, hooks, or the interface itself
     List(List),
     /// Explain a requirement, test, monitor, check, hook or fault
     Explain(Explain),
@@ -341,8 +341,8 @@ impl PageArgs {
 /// What a pipeline reads.
 #[derive(Clone, Debug, Default, Args)]
 pub struct PipelineArgs {
-    /// Write a file for a pipeline, whatever becomes of the run: junit, junit-requirements, markdown, code-quality or sarif;
-    /// may be repeated (docs/ci.md)
+    /// Write a file for a pipeline, whatever becomes of the run: junit, junit-requirements, junit-properties, ctrf, allure,
+    /// markdown, code-quality, sarif, cyclonedx or svr; may be repeated (docs/ci.md)
     #[arg(long = "as", value_name = "KIND=FILE", value_parser = rendering::to_file)]
     pub renderings: Vec<RenderedTo>,
 }

@@ -11,12 +11,22 @@ pub enum Rendering {
     Junit,
     /// JUnit XML with a case for each requirement
     JunitRequirements,
+    /// JUnit XML with properties, and the keys of Xray and `TestRail`
+    JunitProperties,
+    /// Common Test Report Format
+    Ctrf,
+    /// Results of Allure, in a folder
+    Allure,
     /// Markdown, such as for the summary page of a step
     Markdown,
     /// Code quality of GitLab
     CodeQuality,
     /// SARIF 2.1.0
     Sarif,
+    /// Attestations of `CycloneDX`
+    Cyclonedx,
+    /// A simple verification result of in-toto
+    Svr,
 }
 
 /// A rendering, and the file that it goes into.
@@ -24,7 +34,7 @@ pub enum Rendering {
 pub struct RenderedTo {
     /// What it is written as.
     pub rendering: Rendering,
-    /// The file; standard output without one.
+    /// The file, or the folder of several; standard output without one.
     pub file: Option<PathBuf>,
 }
 
@@ -63,5 +73,8 @@ pub(super) fn to_file_or_stdout(text: &str) -> Result<RenderedTo, String> {
         let all: Vec<String> = all.map(|value| value.get_name().to_owned()).collect();
         format!("there is no `{kind}`; there are {}", all.join(", "))
     })?;
+    if rendering == Rendering::Allure && file.is_none() {
+        return Err("results of Allure are a folder of files, written like `allure=FOLDER`".to_owned());
+    }
     Ok(RenderedTo { rendering, file })
 }

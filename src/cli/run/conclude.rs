@@ -11,6 +11,7 @@ use crate::cli::problem::Problem;
 use tck_base::diagnostic::Diagnostic;
 use tck_base::verdict::Verdict;
 use tck_engine::Recorder;
+use tck_report::keys::Keys;
 use tck_report::sources::Sources;
 use tck_report::text::Color;
 use tck_report::{overview, text};
@@ -57,6 +58,7 @@ impl Job {
             inconclusive: self.output.inconclusive,
             root: root.as_deref(),
             folder: bundle.folder(),
+            keys: Keys::default(),
         });
         if let Err(why) = asked {
             unwritten = Some(why);

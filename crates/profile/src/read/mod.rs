@@ -1,6 +1,7 @@
 //! One profile file: TOML into a [`Layer`], with every mistake in it named at its place.
 
 mod hooks;
+mod keys;
 mod known;
 mod layout;
 
@@ -19,7 +20,7 @@ use super::{Deviation, LayoutList, VehicleGroup};
 use tck_base::diagnostic::{self, Diagnostic, Source, Span};
 use tck_pack::{Hooks, RequirementId};
 
-const SECTIONS: [&str; 11] = [
+const SECTIONS: [&str; 12] = [
     "device",
     "bench",
     "motion",
@@ -30,6 +31,7 @@ const SECTIONS: [&str; 11] = [
     "certificate",
     "deviations",
     "known",
+    "keys",
     "hooks",
 ];
 
@@ -148,6 +150,7 @@ impl Reader<'_> {
                 "hooks" => table.iter().for_each(|entry| self.hook(entry)),
                 "deviations" => table.iter().for_each(|entry| self.deviation(entry)),
                 "known" => table.iter().for_each(|entry| self.known(entry)),
+                "keys" => table.iter().for_each(|entry| self.issue_key(entry)),
                 _ => self.section(section, table),
             }
         }

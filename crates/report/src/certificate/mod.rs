@@ -59,22 +59,28 @@ pub enum CertificateError {
     Template(#[from] askama::Error),
 }
 
+/// Every reason why no certificate can be made of a run.
+#[must_use]
+pub fn refusals(result: &RunResult) -> Vec<CertificateError> {
+    let all = [
+        (!result.certifies(), CertificateError::OtherRun),
+        (result.shard.is_some(), CertificateError::Part),
+        (result.partial || result.ran_out_of_time(), CertificateError::Partial),
+        (result.suites_modified, CertificateError::Suites),
+        (result.verdict.is_none(), CertificateError::Nothing),
+    ];
+    all.into_iter()
+        .filter_map(|(holds, why)| holds.then_some(why))
+        .collect()
+}
+
 /// The certificate of a run as one page of HTML. `root` is the root hash of the bundle that holds the evidence.
 ///
 /// # Errors
 /// When the run can certify nothing.
 pub fn render(result: &RunResult, sources: &Sources, root: &str) -> Result<String, CertificateError> {
-    if !result.certifies() {
-        return Err(CertificateError::OtherRun);
-    }
-    if result.shard.is_some() {
-        return Err(CertificateError::Part);
-    }
-    if result.partial || result.ran_out_of_time() {
-        return Err(CertificateError::Partial);
-    }
-    if result.suites_modified {
-        return Err(CertificateError::Suites);
+    if let Some(first) = refusals(result).into_iter().next() {
+        return Err(first);
     }
     let Some(verdict) = result.verdict else {
         return Err(CertificateError::Nothing);
