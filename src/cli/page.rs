@@ -294,19 +294,31 @@ pub(super) fn findings_of(result: &RunResult) -> Vec<Finding> {
     result.tests.iter().flat_map(found_in).chain(of_monitors).collect()
 }
 
-/// What a test has found.
+/// What a test has found. One that was never begun is among those that are left out.
 pub(super) fn found_in(test: &TestResult) -> Vec<Finding> {
-    let decisions = test
+    let mut all: Vec<Finding> = Vec::new();
+    let is_known = test.journal.is_some();
+    let found = test
         .decisions
         .iter()
-        .filter(|decision| decision.verdict() > Verdict::Pass);
-    let found = decisions.map(|decision| Finding {
-        requirement: decision.requirement.clone(),
-        verdict: decision.verdict(),
-        by: test.id.clone(),
-        message: decision.message.clone(),
-        record: decision.witness,
-        count: 1,
-    });
-    found.collect()
+        .filter(|decision| is_known && decision.verdict() > Verdict::Pass);
+    for decision in found {
+        let verdict = decision.verdict();
+        let mut told = all.iter_mut();
+        // What leaves several requirements undecided is said once.
+        if let Some(told) = told.find(|told| told.verdict == verdict && told.message == decision.message) {
+            told.requirement.push_str(", ");
+            told.requirement.push_str(&decision.requirement);
+            continue;
+        }
+        all.push(Finding {
+            requirement: decision.requirement.clone(),
+            verdict,
+            by: test.id.clone(),
+            message: decision.message.clone(),
+            record: decision.witness,
+            count: 1,
+        });
+    }
+    all
 }
