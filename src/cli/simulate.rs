@@ -119,11 +119,12 @@ async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint, form
     let mut signals = Signals::listen()?;
     let clock = WallClock::start();
     let mut running = Vec::new();
-    for number in 1..=device.count {
-        let serial = if device.count == 1 {
-            device.serial.clone()
-        } else {
+    let is_fleet = device.count > 1 || device.offset > 0;
+    for number in device.offset + 1..=device.offset + device.count {
+        let serial = if is_fleet {
             format!("{}-{number}", device.serial)
+        } else {
+            device.serial.clone()
         };
         let mut reference = ReferenceAgv::of(device.vehicle.0, pack);
         let template = device.connection.topic_template.as_deref();
@@ -134,11 +135,11 @@ async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint, form
         let mut reference = BuiltIn::from(reference);
         tolerate(&mut reference, &device.tolerance)?;
         let mut endpoint = endpoint.clone();
-        if let Some(client_id) = endpoint.client_id.as_mut().filter(|_| device.count > 1) {
+        if let Some(client_id) = endpoint.client_id.as_mut().filter(|_| is_fleet) {
             *client_id = format!("{client_id}-{number}");
         }
         let mut agv = start(&reference, &device.fault, &endpoint, clock)?;
-        if number == 1 {
+        if running.is_empty() {
             enter(&mut agv, &endpoint).await?;
         }
         for persona in &device.persona {
@@ -260,7 +261,10 @@ fn configured(
     }
     let like = like(pack);
     if fleet.vehicles.is_empty() {
-        fleet = Fleet::new(&like, "vda5050-tck", &[], tck_simulate::USUAL_FLEET, pack);
+        let count = device
+            .vehicles
+            .map_or(tck_simulate::USUAL_FLEET, |count| count as usize);
+        fleet = Fleet::new(&like, "vda5050-tck", &[], count, pack);
     }
     Ok(ReferenceMasterControl::commanding(fleet, like.layout))
 }

@@ -17,7 +17,8 @@ const SOME: [&str; 4] = [
     "order-rejection/unreadable",
 ];
 
-fn read(path: &Path) -> Value {
+/// A file of JSON.
+pub fn read(path: &Path) -> Value {
     serde_json::from_slice(&fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))).unwrap()
 }
 
@@ -45,7 +46,7 @@ fn run(bench: &Bench, tests: &[&str], more: &[&str]) -> Ended {
 
 /// What a result says, without what differs from run to run: times, the numbers of records, and what a monitor saw kept. That
 /// depends on how a vehicle came from one test to the next.
-fn said(result: &Value) -> [BTreeMap<String, String>; 4] {
+pub fn said(result: &Value) -> [BTreeMap<String, String>; 4] {
     let tests = list(result, "tests").iter().map(|test| {
         let decisions: BTreeSet<String> = list(test, "decisions")
             .iter()

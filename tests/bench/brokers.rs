@@ -133,6 +133,41 @@ async fn a_broker_that_keeps_nothing_retained_is_refused_with_a_reason() {
 }
 
 #[tokio::test]
+async fn a_broker_without_qos_2_is_used_and_the_report_says_so() {
+    let Some(mosquitto) = mosquitto("max_qos 1").await else {
+        return missing("mosquitto");
+    };
+    let (link, info) = MqttBench::start(external(&mosquitto.url)).await.unwrap();
+    let limits = info.limits.concat();
+    assert!(limits.contains("whoever publishes with QoS 2"), "{limits}");
+    assert_eq!(info.limits.len(), 1, "{limits}");
+    link.stop().await;
+}
+
+#[tokio::test]
+async fn a_node_that_is_no_part_of_the_cluster_is_refused() {
+    let (Some(one), Some(other)) = (mosquitto("").await, mosquitto("").await) else {
+        return missing("mosquitto");
+    };
+    let options = BenchOptions {
+        cluster: vec![other.url.clone()],
+        ..external(&one.url)
+    };
+    let error = MqttBench::start(options).await.err().unwrap().to_string();
+    assert!(
+        error.contains(&format!("a message published at {}", other.url)),
+        "{error}"
+    );
+    let alike = BenchOptions {
+        cluster: vec![one.url.clone()],
+        ..external(&one.url)
+    };
+    let (link, info) = MqttBench::start(alike).await.unwrap();
+    assert_eq!(info.limits, Vec::<String>::new());
+    link.stop().await;
+}
+
+#[tokio::test]
 async fn a_broker_that_is_not_there_is_named() {
     let error = MqttBench::start(external("mqtt://127.0.0.1:1")).await.err().unwrap();
     assert!(

@@ -9,7 +9,9 @@ use serde_json::Value;
 pub use super::fault::LinkFault;
 pub use super::packet::{Close, Filter, Packet, Will};
 pub use super::payload::{PAYLOAD_LIMIT, PAYLOAD_PREFIX, Payload, hex};
-pub use super::plan::{Capability, Gate, MockVehicle, Plan, PlannedTest, RunHeader, Setting, ShardRecord};
+pub use super::plan::{
+    Capability, DIVIDED_TESTS, DIVIDED_VEHICLES, Gate, MockVehicle, Plan, PlannedTest, RunHeader, Setting, ShardRecord,
+};
 pub use super::program::{Ending, Origin, Program};
 pub use super::vantage::Direction;
 pub use super::waiver::{Reading, Waiver};

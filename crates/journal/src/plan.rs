@@ -71,6 +71,11 @@ pub struct RunHeader {
     pub shard: Option<ShardRecord>,
 }
 
+/// What a part of a run restricts where its tests are divided.
+pub const DIVIDED_TESTS: &str = "tests was run";
+/// What a part of a run restricts where the vehicles of a master control are divided.
+pub const DIVIDED_VEHICLES: &str = "vehicles was there";
+
 /// Which part of something it is that several processes share, and what all of them share.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase", deny_unknown_fields)]
@@ -83,7 +88,8 @@ pub struct ShardRecord {
     pub origin: String,
     /// How many parts have something to do: where there is less to do than there are parts, the last ones have nothing.
     pub filled: usize,
-    /// How many tests, or faults of a qualification, the parts have together; 0 where that is not known beforehand.
+    /// How many tests, vehicles of a master control, or faults of a qualification the parts have together; 0 where that is not
+    /// known beforehand.
     pub whole: usize,
     /// SHA-256 over the names of all of them: parts with another one are parts of something else.
     pub selection: String,

@@ -7,7 +7,10 @@ use proptest::prelude::*;
 use tck_base::verdict::Verdict;
 use tck_journal::event::{Setting, ShardRecord};
 use tck_judge::{Evidence, JoinError, RunPart, join};
-use tck_result::{Decision, DeviceIdentity, NotDecided, RequirementResult, RunResult, TestResult, TroubleKind};
+use tck_result::{
+    CommandedVehicle, Decision, DeviceIdentity, FleetResult, NotDecided, RequirementResult, RunResult, TestResult,
+    TroubleKind,
+};
 
 fn test(id: &str, requirement: &str, verdict: Verdict) -> TestResult {
     let place = "file:1".to_owned();
@@ -245,6 +248,41 @@ fn devices_of_one_kind_may_share_a_run_and_are_named() {
         part.result.mode = Some("certify".to_owned());
     }
     assert_eq!(joined(&parts).verdict, Some(Verdict::Inconclusive));
+}
+
+#[test]
+fn the_vehicles_of_all_parts_stand_in_the_whole_once_each() {
+    let with = |index: usize, vehicles: &[(&str, usize)]| {
+        let mut part = part(index, 2, Verdict::Pass);
+        let each = vehicles.iter().map(|(name, orders)| CommandedVehicle {
+            serial_number: (*name).to_owned(),
+            orders: *orders,
+            median: (*orders > 0).then_some(3.0),
+            longest: (*orders > 0).then_some(10.0 * f64::from(u8::try_from(*orders).unwrap_or(u8::MAX))),
+        });
+        part.result.fleet = Some(FleetResult {
+            vehicles: vehicles.len(),
+            commanded: vehicles.iter().filter(|(_, orders)| *orders > 0).count(),
+            reaction: None,
+            each: each.collect(),
+        });
+        part
+    };
+    let whole = joined(&[with(2, &[("c", 1), ("a", 2)]), with(1, &[("a", 1), ("b", 0)])]);
+    let fleet = whole.fleet.expect("a fleet");
+    assert_eq!((fleet.vehicles, fleet.commanded, fleet.reaction), (3, 2, None));
+    let each: Vec<(&str, usize, Option<f64>, Option<f64>)> = fleet
+        .each
+        .iter()
+        .map(|one| (one.serial_number.as_str(), one.orders, one.median, one.longest))
+        .collect();
+    let expected = [
+        ("a", 3, None, Some(20.0)),
+        ("b", 0, None, None),
+        ("c", 1, Some(3.0), Some(10.0)),
+    ];
+    assert_eq!(each, expected);
+    assert_eq!(joined(&[part(1, 1, Verdict::Pass)]).fleet, None);
 }
 
 #[test]

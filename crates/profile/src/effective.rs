@@ -196,6 +196,7 @@ impl Taken<'_> {
                 listen: self.text("bench.listen").unwrap_or_default(),
                 tap: self.flag("bench.tap").unwrap_or(true),
                 broker: self.text("bench.broker"),
+                cluster: self.texts("bench.cluster").unwrap_or_default(),
                 own_topics: self.text("bench.own-topics").unwrap_or_default(),
                 client_id: self.text("bench.client-id").unwrap_or_default(),
                 maps_listen: self.text("bench.maps-listen").unwrap_or_default(),

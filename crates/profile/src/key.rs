@@ -35,6 +35,8 @@ pub enum Kind {
     Address,
     /// `mqtt://host:port`, or with `mqtts`; `ws://host:port/path`, or with `wss`.
     Broker,
+    /// Addresses of several brokers.
+    Brokers,
     /// A topic prefix with placeholders.
     Template,
     /// A version, such as `1.2`; whether it is known is for the caller to say.
@@ -345,6 +347,7 @@ pub const KEYS: &[Key] = &[
     key("bench.listen", Kind::Address),
     key("bench.tap", Kind::Flag),
     key("bench.broker", Kind::Broker),
+    key("bench.cluster", Kind::Brokers),
     key("bench.own-topics", Kind::Template),
     key("bench.client-id", Kind::Text),
     key("bench.maps-listen", Kind::Address),
@@ -436,6 +439,7 @@ impl Kind {
             Self::Files => "a list of files, such as [\"hall.map\"]".to_owned(),
             Self::Address => "host and port, such as \"127.0.0.1:1883\"".to_owned(),
             Self::Broker => "an address such as \"mqtt://host:1883\" or \"mqtts://host:8883\"".to_owned(),
+            Self::Brokers => "a list of addresses, such as [\"mqtt://host:1883\"]".to_owned(),
             Self::Template => format!(
                 "levels of a topic; the topic name is added as the last one. Placeholders: {}",
                 TEMPLATE_PLACEHOLDERS

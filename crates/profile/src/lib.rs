@@ -213,6 +213,8 @@ pub struct Bench {
     pub tap: bool,
     /// A broker other than the built-in one, as `mqtt://…`, `mqtts://…`, `ws://…` or `wss://…`.
     pub broker: Option<String>,
+    /// Addresses of other nodes of the cluster that this broker is one of.
+    pub cluster: Vec<String>,
     /// How the topics begin that the harness keeps for itself.
     pub own_topics: String,
     /// How the client ids of the harness begin.

@@ -110,7 +110,7 @@ impl Value {
             (Kind::Action(place), DeValue::Table(table)) => action(table, place),
             (Kind::Action(place), _) if place != Place::Anywhere => Err(wrong_type()),
             (Kind::Speed, _) => speed(number(value).ok_or_else(wrong_type)?),
-            (Kind::Files | Kind::Claims | Kind::Names | Kind::Command, DeValue::Array(items)) => {
+            (Kind::Files | Kind::Brokers | Kind::Claims | Kind::Names | Kind::Command, DeValue::Array(items)) => {
                 let mut texts = Vec::with_capacity(items.len());
                 for (at, item) in items.iter().enumerate() {
                     let DeValue::String(text) = item.get_ref() else {
@@ -123,7 +123,7 @@ impl Value {
                 }
                 Self::from_list(kind, texts, folder, hooks)
             }
-            (Kind::Flag | Kind::Files | Kind::Claims | Kind::Names, _) => Err(wrong_type()),
+            (Kind::Flag | Kind::Files | Kind::Brokers | Kind::Claims | Kind::Names, _) => Err(wrong_type()),
             (_, DeValue::String(text)) => Self::from_text(kind, text, folder, hooks),
             _ => Err(wrong_type()),
         }
@@ -165,7 +165,7 @@ impl Value {
                 let words = shlex::split(text).ok_or_else(|| expected("a quote is left open".to_owned()))?;
                 Self::from_list(kind, words, folder, hooks)
             }
-            Kind::Files | Kind::Claims | Kind::Names => {
+            Kind::Files | Kind::Brokers | Kind::Claims | Kind::Names => {
                 let items = text.split(',').map(|item| item.trim().to_owned()).collect();
                 Self::from_list(kind, items, folder, hooks)
             }
@@ -213,6 +213,11 @@ impl Value {
                     claims.push(claim);
                 }
                 Refusal::all(wrong).map(|()| Self::Claims(claims))
+            }
+            Kind::Brokers => {
+                let checked = items.iter().enumerate();
+                let wrong = checked.filter_map(|(at, item)| broker(item).err().map(|refusal| refusal.at(at)));
+                Refusal::all(wrong.collect()).map(|()| Self::Texts(items))
             }
             _ => {
                 let twice = |at: &usize| items[..*at].contains(&items[*at]);
@@ -458,6 +463,16 @@ mod tests {
         );
         assert!(read(Kind::Broker, "http://host:80").is_err() && read(Kind::Broker, "mqtt://").is_err());
         assert!(read(Kind::Broker, "mqtt://host/path").is_err() && read(Kind::Broker, "ws:///mqtt").is_err());
+    }
+
+    #[test]
+    fn every_node_of_a_cluster_is_an_address() {
+        let two = Value::Texts(vec!["mqtt://a:1883".into(), "mqtts://b".into()]);
+        assert_eq!(read(Kind::Brokers, "mqtt://a:1883, mqtts://b"), Ok(two));
+        assert_eq!(
+            read(Kind::Brokers, "mqtt://a,b:1883").map_err(|r| r.element),
+            Err(Some(1))
+        );
     }
 
     #[test]

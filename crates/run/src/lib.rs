@@ -69,6 +69,6 @@ pub use questions::{Board, Question};
 pub use request::{Request, RequestBuilder};
 pub use selection::{Criteria, Selection, SelectionError, matches, meant, select};
 pub use session::{ENDS_WITHIN, End, Finished, Progress, Setup, run};
-pub use setup::{BenchFacts, DeviceUnderTest, pack_of};
+pub use setup::{BenchFacts, DeviceUnderTest, fleet_names, pack_of};
 pub use sheet::Sheet;
 pub use virtual_run::{Silent, VirtualRun, going_on_at, run_silently, run_virtually};

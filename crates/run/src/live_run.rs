@@ -23,6 +23,7 @@ use super::site::{Topics, bench_of, certificates, reach, resolve};
 use super::virtual_run::{Silent, VirtualRun, run_silently};
 use tck_base::clock::WallClock;
 use tck_base::diagnostic::Diagnostic;
+use tck_base::shard::Shard;
 use tck_engine::{Composer, Engine, EngineError, Onlooker, Operator, RecordError, Recorder};
 use tck_journal::event::{Event, Occurrence, Source as Seen};
 use tck_journal::file::JournalWriter;
@@ -164,6 +165,9 @@ impl LiveRun {
     ) -> Result<Self, Vec<Diagnostic>> {
         let profile = &effective.profile;
         let mut device = DeviceUnderTest::of_profile(effective, &library.rules.packs, pack, place.vehicles)?;
+        if let (Some(fleet), Some(shard)) = (&mut device.fleet, place.shard) {
+            fleet.keep(shard.of_many(fleet.vehicles.len()));
+        }
         device.files = files(effective, place.profile.as_deref(), &place.folder);
         let topics = Topics {
             device: device.published(pack),
@@ -385,6 +389,8 @@ pub struct ProfileContext {
     pub person: Option<Arc<dyn Person>>,
     /// How many mock AGVs a master control gets at least; the usual number unless said.
     pub vehicles: Option<usize>,
+    /// Which part of the mock AGVs, where other processes have the rest.
+    pub shard: Option<Shard>,
 }
 
 /// Everything but link and operator.

@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use super::selection::{Criteria, Selection, SelectionError};
-use super::share::share;
+use super::share::{share, share_vehicles};
 use tck_base::shard::ChosenShard;
-use tck_journal::event::ShardRecord;
+use tck_journal::event::{DIVIDED_TESTS, DIVIDED_VEHICLES, ShardRecord};
 use tck_judge::Library;
 use tck_pack::{Pack, Role};
 
@@ -54,6 +54,7 @@ pub struct RequestBuilder {
     criteria: Criteria,
     left: Option<Selection>,
     shard: Option<ChosenShard>,
+    vehicles: Option<Vec<String>>,
     part: Option<ShardRecord>,
     seed: Option<u64>,
     thorough: bool,
@@ -97,6 +98,13 @@ impl RequestBuilder {
     #[must_use]
     pub fn shard(mut self, shard: ChosenShard) -> Self {
         self.shard = Some(shard);
+        self
+    }
+
+    /// Divides these vehicles, which the harness plays, and not the tests.
+    #[must_use]
+    pub fn vehicles(mut self, names: Vec<String>) -> Self {
+        self.vehicles = Some(names);
         self
     }
 
@@ -185,16 +193,27 @@ impl RequestBuilder {
             None if self.shard.is_some() || self.same_draw => Some(1),
             None => Some(u64::from(random.as_fields().0)),
         };
-        let shard = match &self.shard {
-            Some(chosen) => Some(share(&mut tests, chosen, draw.is_some())),
-            None => self.part,
+        let shard = match (&self.shard, &self.vehicles) {
+            (Some(chosen), Some(vehicles)) => Some(share_vehicles(&tests, chosen, vehicles)),
+            (Some(chosen), None) => Some(share(&mut tests, chosen, draw.is_some())),
+            (None, _) => self.part,
         };
+        if let (Some(ShardRecord { index, of, filled, .. }), Some(_)) = (&shard, &self.vehicles)
+            && index > filled
+        {
+            let why = format!("there is no vehicle for part {index} of {of}: there are {filled}");
+            return Err(SelectionError::Nothing(why));
+        }
         if let Some(ShardRecord { index, of, filled, .. }) = shard.as_ref().filter(|_| tests.is_empty()) {
             let why = format!(
                 "no test was selected for part {index} of {of}: what was selected is divided into no more than {filled}"
             );
             return Err(SelectionError::Nothing(why));
         }
+        let divided = match &self.vehicles {
+            Some(_) => DIVIDED_VEHICLES,
+            None => DIVIDED_TESTS,
+        };
         Ok(Request {
             tests,
             draw,
@@ -208,7 +227,7 @@ impl RequestBuilder {
             repeat: self.repeat.max(1),
             budget: self.budget,
             certifies: self.certifies,
-            limits: shard.iter().map(|shard| shard.limit("tests was run")).collect(),
+            limits: shard.iter().map(|shard| shard.limit(divided)).collect(),
             shard,
         })
     }
@@ -291,6 +310,25 @@ mod tests {
         let other = built(RequestBuilder::new().select("order-rejection").shard(part(1, 2))).unwrap();
         let usual = built(RequestBuilder::new().shard(part(1, 2))).unwrap();
         assert_ne!(other.shard.unwrap().selection, usual.shard.unwrap().selection);
+    }
+
+    #[test]
+    fn vehicles_are_divided_and_every_part_runs_all_tests() {
+        let names: Vec<String> = (1..=5).map(|number| format!("ACME/mock-{number}")).collect();
+        let of_part = |index| built(RequestBuilder::new().shard(part(index, 8)).vehicles(names.clone()));
+        let (one, last) = (of_part(1).unwrap(), of_part(5).unwrap());
+        assert_eq!(one.tests.len(), built(RequestBuilder::new()).unwrap().tests.len());
+        assert_eq!(one.tests.len(), last.tests.len());
+        let facts = |request: &Request| {
+            let shard = request.shard.clone().unwrap();
+            (shard.filled, shard.whole, shard.selection)
+        };
+        assert_eq!(facts(&one), facts(&last));
+        assert_eq!(facts(&one).1, 5);
+        assert!(one.limits[0].contains("of the vehicles"), "{:?}", one.limits);
+        assert!(matches!(of_part(6), Err(SelectionError::Nothing(_))));
+        let fewer = built(RequestBuilder::new().shard(part(1, 8)).vehicles(names[1..].to_vec())).unwrap();
+        assert_ne!(facts(&one).2, facts(&fewer).2);
     }
 
     #[test]

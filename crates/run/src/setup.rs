@@ -22,7 +22,7 @@ use tck_pack::{Pack, Packs, Role};
 use tck_profile::{Effective, Profile, TimeLimits};
 use tck_simulate::BuiltIn;
 use tck_simulate::Fleet;
-use tck_simulate::ReferenceAgv;
+use tck_simulate::{ReferenceAgv, serial_number};
 
 /// What is known of the device under test before it is there.
 #[derive(Clone, Debug)]
@@ -254,6 +254,26 @@ pub fn pack_of(library: &Library, effective: &Effective) -> Result<Arc<Pack>, Di
     })
 }
 
+/// The names of the mock AGVs that a master control gets by a profile, where at least so many are asked for; in their order.
+#[must_use]
+pub fn fleet_names(profile: &Profile, vehicles: Option<usize>) -> Vec<String> {
+    let wanted = &profile.vehicles;
+    let own = (0..fleet_size(profile, vehicles.unwrap_or_default())).map(|before| {
+        let serial = serial_number(&wanted.serial_numbers, before);
+        format!("{}/{serial}", wanted.manufacturer)
+    });
+    let others = wanted.others.iter().flat_map(|group| {
+        let serials = group.serial_numbers.iter();
+        serials.map(|serial| format!("{}/{serial}", group.manufacturer))
+    });
+    own.chain(others).collect()
+}
+
+/// How many mock AGVs of a profile speak its version.
+fn fleet_size(profile: &Profile, vehicles: usize) -> usize {
+    vehicles.max(profile.vehicles.serial_numbers.len()).max(1)
+}
+
 fn subject(profile: &Profile) -> Result<Participant, Vec<Diagnostic>> {
     let missing = |setting: &str, flag: &str| {
         let title = format!("the device is not named: `{setting}` is missing");
@@ -315,7 +335,7 @@ fn join_others(
 fn fleet(profile: &Profile, layout: Option<&Layout>, vehicles: usize, pack: &Pack) -> Fleet {
     let like = mock(profile, layout, pack);
     let wanted = &profile.vehicles;
-    let count = vehicles.max(wanted.serial_numbers.len()).max(1);
+    let count = fleet_size(profile, vehicles);
     let mut fleet = Fleet::new(&like, &wanted.manufacturer, &wanted.serial_numbers, count, pack);
     if let (Some(vehicle), Some(node)) = (fleet.vehicles.first_mut(), &wanted.start_node) {
         vehicle.config.start_node.clone_from(node);

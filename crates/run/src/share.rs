@@ -49,6 +49,17 @@ pub(super) fn share(tests: &mut Selection, chosen: &ChosenShard, is_drawn: bool)
     record
 }
 
+/// The part of the vehicles of a master control that one process plays. Each part runs all tests, about vehicles of its own.
+pub(super) fn share_vehicles(tests: &Selection, chosen: &ChosenShard, vehicles: &[String]) -> ShardRecord {
+    let tests = tests.iter().map(|test| test.id.as_str());
+    let names: Vec<&str> = tests.chain(vehicles.iter().map(String::as_str)).collect();
+    let record = ShardRecord::of(chosen, chosen.shard.of.min(vehicles.len()), &names);
+    ShardRecord {
+        whole: vehicles.len(),
+        ..record
+    }
+}
+
 /// The name of what is not divided any further.
 fn piece(test: &Test, is_drawn: bool) -> &str {
     if is_drawn { test.table() } else { &test.id }

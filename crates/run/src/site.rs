@@ -111,6 +111,7 @@ pub(super) fn bench_of(
                 },
             },
         },
+        cluster: bench.cluster.clone(),
         authority: bench.tls_ca.clone(),
         tap: bench.tap,
         tls: shown(bench.tls_cert.as_ref(), bench.tls_key.as_ref()),

@@ -1,6 +1,7 @@
 //! The mock AGVs that a master control is tested with: reference AGVs with identities and places of their own.
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 use std::time::Duration;
 
 use serde_json::{Value, json};
@@ -22,11 +23,22 @@ pub struct Fleet {
     /// The vehicles; the first one is the one that tests talk about.
     pub vehicles: Vec<ReferenceAgv>,
     topics: Vec<FleetTopic>,
+    /// Whether other processes have the rest of its vehicles.
+    is_part: bool,
+}
+
+/// The serial number of the vehicle that comes after so many others: one of those given, or one that is made up.
+#[must_use]
+pub fn serial_number(serials: &[String], before: usize) -> String {
+    let given = serials.get(before).cloned();
+    given.unwrap_or_else(|| format!("{MADE_UP}{}", before + 1))
 }
 
 /// A topic of a vehicle of a fleet.
 #[derive(Clone, Debug)]
 struct FleetTopic {
+    /// The number of its vehicle in the fleet, counted from 0.
+    vehicle: usize,
     /// The whole topic.
     full: String,
     /// The whole topic, with `+` for the serial number.
@@ -42,9 +54,7 @@ impl Fleet {
     pub fn new(like: &ReferenceAgv, manufacturer: &str, serials: &[String], count: usize, pack: &Pack) -> Self {
         let mut fleet = Self::default();
         for number in 0..count.max(1) {
-            let serial = serials.get(number).cloned();
-            let serial = serial.unwrap_or_else(|| format!("{MADE_UP}{}", number + 1));
-            fleet.join(like, manufacturer, &serial, pack);
+            fleet.join(like, manufacturer, &serial_number(serials, number), pack);
             // The first two stand far from each other, so that neither is in the way.
             let places = like.places();
             let place = match number {
@@ -78,6 +88,7 @@ impl Fleet {
         for (name, full) in &vehicle.config.topics {
             let Some(rule) = pack.topic(name) else { continue };
             self.topics.push(FleetTopic {
+                vehicle: number,
                 full: full.clone(),
                 of_any: of_any.remove(name),
                 publisher: rule.publisher,
@@ -85,6 +96,21 @@ impl Fleet {
             });
         }
         self.vehicles.push(vehicle);
+    }
+
+    /// Keeps a part of the vehicles, where other processes have the rest. The first two of a part stand and speak as the first two
+    /// of the whole do, since tests talk about them.
+    pub fn keep(&mut self, own: Range<usize>) {
+        let whole = std::mem::take(&mut self.vehicles);
+        let usual: Vec<ReferenceAgv> = whole.iter().take(USUAL_FLEET).cloned().collect();
+        self.vehicles = whole.into_iter().take(own.end).skip(own.start).collect();
+        for (vehicle, like) in self.vehicles.iter_mut().zip(&usual) {
+            vehicle.config.start_node.clone_from(&like.config.start_node);
+            vehicle.config.state_interval = like.config.state_interval;
+            vehicle.config.visualization_interval = like.config.visualization_interval;
+        }
+        self.topics.retain(|topic| own.contains(&topic.vehicle));
+        self.is_part = true;
     }
 
     /// As the journal of a run in this version names them.
@@ -143,14 +169,22 @@ impl Fleet {
     }
 
     /// Where vehicles of the harness may have left retained messages: these, and those of a run that had more of them and never
-    /// came to its end.
+    /// came to its end. A part of a fleet leaves those of the other parts alone.
     #[must_use]
     pub fn leavings(&self) -> Leavings {
+        if self.is_part {
+            return Leavings {
+                own: self.published(),
+                filters: self.topics_where(|topic| topic.publisher == Role::Agv && topic.is_retained),
+                any_made_up: false,
+            };
+        }
         let published = self.topics.iter().filter(|topic| topic.publisher == Role::Agv);
         let made_up: BTreeSet<String> = published.filter_map(|topic| topic.of_any.clone()).collect();
         Leavings {
             own: self.published(),
             filters: made_up.into_iter().collect(),
+            any_made_up: true,
         }
     }
 
@@ -165,8 +199,10 @@ impl Fleet {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Leavings {
     own: Vec<String>,
-    /// These topics as filters, with `+` for the serial number.
+    /// What is subscribed to: these topics with `+` for the serial number, unless they are a part of a fleet.
     filters: Vec<String>,
+    /// Whether vehicles whose name is made up are the harness's own, whatever their number.
+    any_made_up: bool,
 }
 
 impl Leavings {
@@ -185,7 +221,8 @@ impl Leavings {
             let number = serial.strip_prefix(MADE_UP)?;
             Some(!number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit()))
         };
-        self.own.iter().any(|own| own == topic) || self.filters.iter().any(|filter| is_made_up(filter) == Some(true))
+        let made_up = || self.any_made_up && self.filters.iter().any(|filter| is_made_up(filter) == Some(true));
+        self.own.iter().any(|own| own == topic) || made_up()
     }
 }
 
@@ -210,5 +247,34 @@ mod tests {
         let retained = fleet.retained();
         assert!(retained.contains(&of("A-1", "connection")) && retained.contains(&of("mock-2", "factsheet")));
         assert!(!retained.contains(&of("A-1", "state")), "{retained:?}");
+    }
+
+    #[test]
+    fn a_part_of_a_fleet_begins_as_the_fleet_does_and_touches_no_other_part() {
+        let library = tck_testing::library();
+        let pack = library.rules.packs.latest();
+        let whole = Fleet::new(&ReferenceAgv::new(pack), "ACME", &["A-1".to_owned()], 7, pack);
+        let mut part = whole.clone();
+        part.keep(3..6);
+        let named: Vec<&str> = part
+            .vehicles
+            .iter()
+            .map(|one| one.subject.serial_number.as_str())
+            .collect();
+        assert_eq!(named, ["mock-4", "mock-5", "mock-6"]);
+        for (own, like) in part.vehicles.iter().zip(&whole.vehicles).take(2) {
+            assert_eq!(own.config.start_node, like.config.start_node);
+            assert_eq!(own.config.state_interval, like.config.state_interval);
+        }
+        assert_eq!(part.vehicles[2].config.state_interval, Duration::from_secs(1));
+        let of = |serial: &str, name: &str| pack.fill_topic(pack.topic_template(), "ACME", serial, name);
+        let leavings = part.leavings();
+        assert!(leavings.is_own(&of("mock-4", "connection")));
+        for serial in ["A-1", "mock-3", "mock-7", "mock-17"] {
+            assert!(!leavings.is_own(&of(serial, "connection")), "{serial}");
+        }
+        assert!(leavings.filters().contains(&of("mock-6", "factsheet")));
+        assert!(!leavings.filters().iter().any(|filter| filter.contains('+')));
+        assert_eq!(part.commanded().len() * 7, whole.commanded().len() * 3);
     }
 }

@@ -18,7 +18,7 @@ mod unknown_name;
 mod witness;
 
 pub use built_in::BuiltIn;
-pub use fleet::{Fleet, Leavings, USUAL_FLEET};
+pub use fleet::{Fleet, Leavings, USUAL_FLEET, serial_number};
 pub use hook_server::HookServer;
 pub use reference_agv::{ReferenceAgv, Vehicle};
 pub use reference_master_control::ReferenceMasterControl;

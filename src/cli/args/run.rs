@@ -88,7 +88,7 @@ pub struct Run {
     )]
     pub vehicle: super::vehicle::VehicleKind,
     /// How many mock AGVs a master control is tested with [default: 2]
-    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=1_000), help_heading = "Master control")]
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=10_000), help_heading = "Master control")]
     pub vehicles: Option<u32>,
     /// Run against the built-in device in memory and in virtual time, without a network
     #[arg(long = "virtual", help_heading = "Built-in device", conflicts_with_all = ["profile", "listen", "broker", "no_tap"])]
@@ -105,7 +105,7 @@ pub struct Run {
     /// Whether it is a run for a certificate, which is alike for everybody: set by `certify`.
     #[arg(skip)]
     pub certificate: bool,
-    /// Only part I of N of the tests, for several benches at once; 1/1 is all of them, whatever a scheduler says (docs/shards.md)
+    /// Only part I of N of the tests, or of the vehicles of a master control, for several benches at once; 1/1 is all of them, whatever a scheduler says (docs/shards.md)
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
 }

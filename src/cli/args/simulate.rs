@@ -76,6 +76,7 @@ const SIMULATE_AGV_HELP: &str = "\
 Examples:
   vda5050-tck simulate agv --broker mqtt://127.0.0.1:1883
   vda5050-tck simulate agv --count 50 --manufacturer ACME
+  vda5050-tck simulate agv --count 50 --manufacturer ACME --offset 50   fifty more of them
   vda5050-tck simulate agv --fault outdated-update-taken-over
   vda5050-tck simulate agv --persona ignore-orders --persona 'set-battery={\"charge\": 10}'
 
@@ -91,12 +92,15 @@ pub struct SimulatedAgv {
     /// Manufacturer, as in its topics
     #[arg(long, value_name = "NAME", default_value = "vda5050-tck")]
     pub manufacturer: String,
-    /// Serial number, as in its topics; with --count a number is added
+    /// Serial number, as in its topics; with --count or --offset a number is added
     #[arg(long, value_name = "NUMBER", default_value = "reference")]
     pub serial: String,
     /// How many of them
     #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub count: u32,
+    /// How many of the fleet other processes have: the numbers go on behind theirs
+    #[arg(long, value_name = "NUMBER", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=10_000_000))]
+    pub offset: u32,
     /// Which kind of vehicle it is
     #[arg(long, value_name = "KIND", value_enum, default_value_t)]
     pub vehicle: VehicleKind,
@@ -142,6 +146,9 @@ pub struct SimulatedMasterControl {
     /// A vehicle it commands; may be repeated [default: vda5050-tck/mock-1 and vda5050-tck/mock-2]
     #[arg(long, value_name = "MANUFACTURER/SERIAL[@VERSION]")]
     pub vehicle: Vec<VehicleArg>,
+    /// How many vehicles it commands: vda5050-tck/mock-1 and so on
+    #[arg(long, value_name = "NUMBER", conflicts_with = "vehicle", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub vehicles: Option<u32>,
     /// The floor, as a LIF file; the floor of the reference AGV unless said
     #[arg(long, value_name = "FILE")]
     pub layout: Option<PathBuf>,

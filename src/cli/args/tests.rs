@@ -162,3 +162,61 @@ fn every_example_in_a_help_is_a_command_and_names_tests_that_exist() {
         );
     }
 }
+
+/// The commands of a file in `deploy/`: lines that begin with the program, up to what a shell makes of them. What the shell puts in
+/// stands as 1.
+fn deployed(text: &str) -> Vec<String> {
+    let lines = text.lines().map(|line| line.trim_start().trim_start_matches("- "));
+    let own = lines.filter_map(|line| {
+        let line = line.strip_prefix("vda5050-tck ")?;
+        let (line, _) = line.split_once(" || ").unwrap_or((line, ""));
+        Some(without_variables(line))
+    });
+    own.collect()
+}
+
+/// A line in which what a shell or a pipeline puts in is 1.
+fn without_variables(line: &str) -> String {
+    let mut text = String::new();
+    let mut rest = line;
+    while let Some((before, behind)) = rest.split_once('$') {
+        text += before;
+        text.push('1');
+        rest = match behind.as_bytes().first() {
+            Some(b'{') => behind
+                .trim_start_matches('{')
+                .split_once('}')
+                .map_or("", |(_, rest)| rest.trim_start_matches('}')),
+            Some(b'@') => &behind[1..],
+            _ => behind.trim_start_matches(|c: char| c.is_ascii_alphanumeric() || c == '_'),
+        };
+    }
+    text + rest
+}
+
+#[test]
+fn every_command_in_an_example_for_a_scheduler_is_one() {
+    let deploy = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("deploy");
+    let mut files = Vec::new();
+    for folder in [deploy.clone(), deploy.join("kubernetes")] {
+        let entries = std::fs::read_dir(folder).expect("examples");
+        files.extend(
+            entries
+                .map(|entry| entry.expect("entry").path())
+                .filter(|path| path.is_file()),
+        );
+    }
+    let mut count = 0;
+    for path in files {
+        let text = std::fs::read_to_string(&path).expect("text");
+        for line in deployed(&text) {
+            if let Err(error) = parse(&line) {
+                panic!("{}: {line}: {error}", path.display());
+            }
+            count += 1;
+        }
+    }
+    assert!(count >= 9, "only {count} commands were found");
+    let line = "vda5050-tck run --shard ${{ matrix.part }}/4 --out \"a/$PART\" ${MORE:-} \"$@\" || code=$?";
+    assert_eq!(deployed(line), ["run --shard 1/4 --out \"a/1\" 1 \"1\""]);
+}

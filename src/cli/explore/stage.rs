@@ -300,6 +300,7 @@ impl OnStage {
                     folder: folder.clone(),
                     person: person(&self.desk, self.served.is_some()),
                     vehicles: None,
+                    shard: None,
                 };
                 let mut run = LiveRun::of_profile(effective, library, pack, surroundings, place)?;
                 if *still {

@@ -27,7 +27,7 @@ use crate::ui::Prompter;
 use tck_base::clock::WallClock;
 use tck_base::diagnostic::{Diagnostic, Source, Span};
 use tck_base::secrets::Secrets;
-use tck_base::shard::ChosenShard;
+use tck_base::shard::{ChosenShard, Shard};
 use tck_journal::file::JournalWriter;
 use tck_journal::{Reason, Vantage};
 use tck_judge::Library;
@@ -42,7 +42,7 @@ use tck_profile::{self as profile, Effective, Surroundings};
 use tck_report::statement::many;
 use tck_run::{
     Answering, AnsweringError, Bundle, Criteria, Hold, LATEST, LiveRun, Person, ProfileContext, Request,
-    RequestBuilder, RunError, RunPlan, VirtualRun, going_on_at, pack_of, run_virtually,
+    RequestBuilder, RunError, RunPlan, VirtualRun, fleet_names, going_on_at, pack_of, run_virtually,
 };
 use tck_simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
 
@@ -99,7 +99,12 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
         Some(folder) => Some(Earlier::read(folder, &library.tests(role, &pack.id), &library)?),
         None => None,
     };
-    let request = asked(arguments, part, earlier.as_ref()).build(role, &library, &pack)?;
+    let mut wanted = asked(arguments, part, earlier.as_ref());
+    if role == Role::MasterControl && !built_in {
+        let count = arguments.vehicles.map(|count| count as usize);
+        wanted = wanted.vehicles(fleet_names(&effective.profile, count));
+    }
+    let request = wanted.build(role, &library, &pack)?;
     if role == Role::MasterControl && arguments.vehicle.0 != tck_simulate::Vehicle::default() {
         let title = "`--vehicle` is for the reference AGV, and a master control is tested here";
         return Err(Diagnostic::whole("usage", title).into());
@@ -292,6 +297,11 @@ impl Job {
                 arguments.people.questions.is_some() || self.effective.profile.bench.page.is_some(),
             ),
             vehicles: self.vehicles,
+            shard: self
+                .request
+                .shard
+                .as_ref()
+                .and_then(|own| Shard::new(own.index, own.of)),
         };
         let mut run = LiveRun::of_profile(&self.effective, &self.library, &self.pack, surroundings, place)?;
         run.device.claims_add = !self.certifies;
@@ -375,6 +385,7 @@ impl Job {
             run.options.listen.clone_from(&bench.listen);
         }
         let identity = bench.client_cert.clone().zip(bench.client_key.clone());
+        run.options.cluster.clone_from(&bench.cluster);
         if let Some(url) = &bench.broker {
             run.options.broker = BrokerChoice::External {
                 url: url.clone(),

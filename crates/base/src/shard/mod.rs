@@ -4,6 +4,7 @@ mod scheduler;
 mod split;
 
 use std::fmt;
+use std::ops::Range;
 use std::str::FromStr;
 
 pub use scheduler::{ChosenShard, Count, Numbering, SCHEDULERS, SHARDS, Scheduler, SchedulerError, chosen};
@@ -26,6 +27,15 @@ impl Shard {
     #[must_use]
     pub fn new(index: usize, of: usize) -> Option<Self> {
         ((1..=of).contains(&index) && of <= MOST).then_some(Self { index, of })
+    }
+
+    /// Which of so many things in a row are in this part. Parts differ by one thing at most; with fewer things than parts the last
+    /// ones have none.
+    #[must_use]
+    pub fn of_many(self, count: usize) -> Range<usize> {
+        let filled = self.of.min(count).max(1);
+        let before = |index: usize| count * index.min(filled) / filled;
+        before(self.index.saturating_sub(1))..before(self.index)
     }
 
     /// Whether it is all there is.
@@ -60,6 +70,20 @@ impl FromStr for Shard {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn things_in_a_row_are_divided_without_a_gap() {
+        for (count, of) in [(40, 4), (10, 3), (3, 8), (0, 2), (5_000, 16)] {
+            let parts: Vec<Range<usize>> = (1..=of).map(|index| Shard { index, of }.of_many(count)).collect();
+            let all: Vec<usize> = parts.iter().flat_map(Clone::clone).collect();
+            assert_eq!(all, (0..count).collect::<Vec<usize>>());
+            let filled = of.min(count);
+            let (least, most) = (count / filled.max(1), count.div_ceil(filled.max(1)));
+            for part in &parts[..filled] {
+                assert!((least..=most).contains(&part.len()), "{count} in {of}: {parts:?}");
+            }
+        }
+    }
 
     #[test]
     fn a_part_is_read_as_it_is_written() {

@@ -4,6 +4,7 @@
 //! joined by the lattice, so that no part can lower what another one found. What keeps the parts from being the whole is named,
 //! and leaves the whole undecided.
 
+mod fleet;
 mod identity;
 mod requirements;
 
@@ -13,6 +14,7 @@ use super::conversation_coverage;
 use super::merge;
 use super::rules::Rules;
 use tck_base::verdict::{Accumulated, Verdict};
+use tck_journal::event::{DIVIDED_TESTS, DIVIDED_VEHICLES};
 use tck_pack::Role;
 use tck_result::{
     DeviceIdentity, MergeTrouble, MergedPart, MergedRun, MonitorResult, Part as _, RunResult, TestResult, gathered,
@@ -95,7 +97,7 @@ pub fn join(rules: &Rules, parts: &[RunPart]) -> Result<RunResult, JoinError> {
         joined: Vec::new(),
         shard: None,
         exploration: conversation_coverage::exploration(&rules.suites.tests, &tests, role),
-        fleet: None,
+        fleet: fleet::fleet(own),
         capabilities: first.result.capabilities.clone(),
         limits: limits(own, &merged),
         deviations: results().flat_map(|one| one.deviations.clone()).collect(),
@@ -230,13 +232,10 @@ fn limits(own: &[&RunPart], merged: &MergedRun) -> Vec<String> {
         ));
     }
     for part in own {
-        let is_one = part.result.shard.as_ref().map(|shard| shard.limit("tests was run"));
-        for limit in part
-            .result
-            .limits
-            .iter()
-            .filter(|limit| Some(*limit) != is_one.as_ref())
-        {
+        let divided = [DIVIDED_TESTS, DIVIDED_VEHICLES];
+        let shard = part.result.shard.as_ref();
+        let is_one = |limit: &String| shard.is_some_and(|shard| divided.iter().any(|what| shard.limit(what) == *limit));
+        for limit in part.result.limits.iter().filter(|limit| !is_one(limit)) {
             if !all.contains(limit) {
                 all.push(limit.clone());
             }

@@ -5,12 +5,14 @@
 
 #[cfg(not(feature = "broker"))]
 mod absent;
+mod difference;
 #[cfg(feature = "broker")]
 mod embedded;
 mod self_test;
 
 #[cfg(not(feature = "broker"))]
 pub use absent::EmbeddedBroker;
+pub use difference::Difference;
 #[cfg(feature = "broker")]
 pub use embedded::EmbeddedBroker;
 pub use self_test::{Tested, self_test};

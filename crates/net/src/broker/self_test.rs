@@ -13,23 +13,30 @@ use crate::bench::endpoint::Endpoint;
 use crate::bench::own::OwnNames;
 use tck_base::device::Publication;
 
+use super::difference::Difference;
+
 /// How long each message may take.
 const LIMIT: Duration = Duration::from_secs(5);
+/// How long what is stored may come after what was published behind the subscription.
+const BEHIND: Duration = Duration::from_millis(500);
+/// How often it is looked whether a message is stored at another node, which may learn of it a little later.
+const LOOKS: u32 = 3;
 
 /// What a self-test found out.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Tested {
-    /// The broker keeps the rules.
-    Keeps,
+    /// The broker keeps the rules that verdicts depend on; in this it differs from what others do.
+    Keeps(Vec<Difference>),
     /// It does not let the harness use topics of its own, so that nothing could be tested.
     Forbids(String),
 }
 
-/// Tests QoS, retained messages and wills of a broker, on topics of its own that are cleaned up afterwards.
+/// Tests QoS, retained messages and wills of a broker, and what other nodes of its cluster know of them, on topics of its own
+/// that are cleaned up afterwards.
 ///
 /// # Errors
 /// [`LinkError::Broker`] when it cannot be reached, [`LinkError::Setup`] naming the rule it breaks.
-pub async fn self_test(endpoint: &Endpoint, own: &OwnNames) -> Result<Tested, LinkError> {
+pub async fn self_test(endpoint: &Endpoint, nodes: &[Endpoint], own: &OwnNames) -> Result<Tested, LinkError> {
     let base = format!("{}/self-test/{}", own.topics, uuid::Uuid::new_v4().simple());
     let mut watcher = match Tester::connect((endpoint, own), "watcher", None, vec![(format!("{base}/#"), 2)]).await {
         Err(LinkError::Broker { reason, .. }) if reason.starts_with(REFUSED_SUBSCRIPTION) => {
@@ -37,7 +44,7 @@ pub async fn self_test(endpoint: &Endpoint, own: &OwnNames) -> Result<Tested, Li
         }
         watcher => watcher?,
     };
-    let result = check((endpoint, own), &base, &mut watcher).await;
+    let result = check((endpoint, own), nodes, &base, &mut watcher).await;
     if !matches!(result, Ok(Tested::Forbids(_))) {
         // Whatever came out of it, nothing stays behind on the broker.
         for name in ["retained", "will"] {
@@ -52,9 +59,11 @@ pub async fn self_test(endpoint: &Endpoint, own: &OwnNames) -> Result<Tested, Li
 
 async fn check(
     (endpoint, own): (&Endpoint, &OwnNames),
+    nodes: &[Endpoint],
     base: &str,
     watcher: &mut Tester<'_>,
 ) -> Result<Tested, LinkError> {
+    let mut differences = Vec::new();
     let topic = format!("{base}/qos");
     if !watcher.is_heard(&topic).await? {
         return Ok(Tested::Forbids(format!(
@@ -62,7 +71,7 @@ async fn check(
             watcher.client_id
         )));
     }
-    for qos in 0..=2 {
+    for qos in 0..=1 {
         watcher.publish(message(&topic, "x", qos, false))?;
         let got = watcher.message(&format!("a message published with QoS {qos}")).await?;
         if got.qos != qos {
@@ -71,6 +80,19 @@ async fn check(
                 &format!("a message published with QoS {qos} arrives with QoS {}", got.qos),
             ));
         }
+    }
+    // Neither is needed by the devices that are judged, so that a broker may do without.
+    let (to, sent) = (format!("{base}/twice"), 2);
+    match passed_on((endpoint, own), watcher, message(&to, "x", sent, false)).await? {
+        None => differences.push(Difference::RefusesQos2),
+        Some(got) if got.qos == sent => {}
+        Some(got) => differences.push(Difference::LowersQos2(got.qos)),
+    }
+    let to = format!("{base}/with.dot");
+    match passed_on((endpoint, own), watcher, message(&to, "x", 1, false)).await? {
+        None => differences.push(Difference::RefusesDots),
+        Some(got) if got.topic == to => {}
+        Some(_) => differences.push(Difference::ChangesDots),
     }
     let topic = format!("{base}/retained");
     watcher.publish(message(&topic, "old", 1, true))?;
@@ -81,17 +103,23 @@ async fn check(
     watcher.publish(message(&topic, "new", 1, true))?;
     watcher.message("a second retained message").await?;
     let mut fresh = Tester::connect((endpoint, own), "fresh", None, vec![(topic.clone(), 2)]).await?;
-    let stored = fresh.message("the stored message for a fresh subscriber").await?;
-    if !stored.retain || stored.qos != 1 || stored.payload != "new" {
+    let got = fresh.message("the stored message for a fresh subscriber").await?;
+    if !got.retain || got.qos != 1 || got.payload != "new" {
         let text = format!(
             "a fresh subscriber gets `{}` with QoS {} and RETAIN {}, not the last message with QoS 1 and RETAIN set",
-            stored.payload.escape_debug(),
-            stored.qos,
-            stored.retain
+            got.payload.escape_debug(),
+            got.qos,
+            got.retain
         );
         return Err(broken(endpoint, &text));
     }
     fresh.client.disconnect().await;
+    if stored((endpoint, own), watcher, base, "+").await?.is_none() {
+        differences.push(Difference::KeepsFromWildcards);
+    }
+    for node in nodes {
+        differences.extend(elsewhere((node, own), watcher, base).await?);
+    }
     let topic = format!("{base}/will");
     let orderly = Tester::connect(
         (endpoint, own),
@@ -113,7 +141,70 @@ async fn check(
             &format!("a last will with QoS 1 arrives with QoS {}", will.qos),
         ));
     }
-    Ok(Tested::Keeps)
+    Ok(Tested::Keeps(differences))
+}
+
+/// How a message of another client arrives; `None` when its connection is ended for it.
+async fn passed_on(
+    at: (&Endpoint, &OwnNames),
+    watcher: &mut Tester<'_>,
+    message: Publication,
+) -> Result<Option<Got>, LinkError> {
+    let mut sender = Tester::connect(at, "sender", None, vec![]).await?;
+    let what = format!("a message published with QoS {} on {}", message.qos, message.topic);
+    sender.publish(message)?;
+    let got = tokio::select! {
+        got = watcher.message(&what) => got?,
+        () = sender.ended() => return Ok(None),
+    };
+    sender.client.disconnect().await;
+    Ok(Some(got))
+}
+
+/// What a fresh subscriber gets of what was retained before.
+async fn stored(
+    at: (&Endpoint, &OwnNames),
+    watcher: &mut Tester<'_>,
+    base: &str,
+    filter: &str,
+) -> Result<Option<Got>, LinkError> {
+    let end = format!("{base}/end");
+    let subscriptions = vec![(format!("{base}/{filter}"), 2), (end.clone(), 2)];
+    let mut fresh = Tester::connect(at, "fresh", None, subscriptions).await?;
+    watcher.publish(message(&end, "x", 1, false))?;
+    watcher.message("a message of its own").await?;
+    let mut limit = LIMIT;
+    let found = loop {
+        match fresh.within(limit).await? {
+            Some(got) if got.retain => break Some(got),
+            Some(got) if got.topic == end => limit = BEHIND,
+            Some(_) => {}
+            None => break None,
+        }
+    };
+    fresh.client.disconnect().await;
+    Ok(found)
+}
+
+/// What another node of the cluster does not do for the clients of this one.
+async fn elsewhere(
+    (node, own): (&Endpoint, &OwnNames),
+    watcher: &mut Tester<'_>,
+    base: &str,
+) -> Result<Option<Difference>, LinkError> {
+    let sender = Tester::connect((node, own), "sender", None, vec![]).await?;
+    sender.publish(message(&format!("{base}/elsewhere"), "x", 1, false))?;
+    watcher
+        .message(&format!("a message published at {}", node.url()))
+        .await?;
+    sender.client.disconnect().await;
+    for _ in 0..LOOKS {
+        let found = stored((node, own), watcher, base, "retained").await?;
+        if found.is_some_and(|got| got.payload == "new") {
+            return Ok(None);
+        }
+    }
+    Ok(Some(Difference::KeepsFromNode(node.url())))
 }
 
 struct Tester<'a> {
@@ -125,14 +216,16 @@ struct Tester<'a> {
 }
 
 struct Got {
+    topic: String,
     payload: String,
     qos: u8,
     retain: bool,
 }
 
 impl Got {
-    fn new(payload: &[u8], qos: u8, retain: bool) -> Self {
+    fn new(topic: String, payload: &[u8], qos: u8, retain: bool) -> Self {
         Self {
+            topic,
             payload: String::from_utf8_lossy(payload).into_owned(),
             qos,
             retain,
@@ -168,9 +261,13 @@ impl<'a> Tester<'a> {
                 Ok(Some(ClientEvent::Connected)) => return Ok(tester),
                 // A stored message may come before the acknowledgement.
                 Ok(Some(ClientEvent::Message {
-                    payload, qos, retain, ..
+                    topic,
+                    payload,
+                    qos,
+                    retain,
+                    ..
                 })) => {
-                    tester.early.push_back(Got::new(&payload, qos, retain));
+                    tester.early.push_back(Got::new(topic, &payload, qos, retain));
                 }
                 Ok(Some(ClientEvent::Lost(reason))) => return Err(endpoint.lost(reason)),
                 Ok(None) => return Err(endpoint.lost("the connection ended")),
@@ -199,20 +296,42 @@ impl<'a> Tester<'a> {
     }
 
     async fn message(&mut self, what: &str) -> Result<Got, LinkError> {
-        if let Some(early) = self.early.pop_front() {
-            return Ok(early);
-        }
-        match timeout(LIMIT, self.events.recv()).await {
-            Ok(Some(ClientEvent::Message {
-                payload, qos, retain, ..
-            })) => Ok(Got::new(&payload, qos, retain)),
-            Ok(Some(ClientEvent::Lost(reason))) => Err(broken(
+        match self.next(LIMIT).await {
+            Ok(Some(got)) => Ok(got),
+            Ok(None) => Err(broken(self.endpoint, &format!("{what} never arrives"))),
+            Err(reason) => Err(broken(
                 self.endpoint,
                 &format!("it ends the connection where {what} should arrive ({reason})"),
             )),
-            Ok(Some(ClientEvent::Connected) | None) => Err(self.endpoint.lost("the connection ended")),
-            Err(_) => Err(broken(self.endpoint, &format!("{what} never arrives"))),
         }
+    }
+
+    /// The next message, if one comes in time.
+    async fn within(&mut self, limit: Duration) -> Result<Option<Got>, LinkError> {
+        self.next(limit).await.map_err(|reason| self.endpoint.lost(reason))
+    }
+
+    async fn next(&mut self, limit: Duration) -> Result<Option<Got>, String> {
+        if let Some(early) = self.early.pop_front() {
+            return Ok(Some(early));
+        }
+        match timeout(limit, self.events.recv()).await {
+            Ok(Some(ClientEvent::Message {
+                topic,
+                payload,
+                qos,
+                retain,
+                ..
+            })) => Ok(Some(Got::new(topic, &payload, qos, retain))),
+            Ok(Some(ClientEvent::Lost(reason))) => Err(reason),
+            Ok(Some(ClientEvent::Connected) | None) => Err("the connection ended".to_owned()),
+            Err(_) => Ok(None),
+        }
+    }
+
+    /// Waits until the broker ends the connection.
+    async fn ended(&mut self) {
+        while !matches!(self.events.recv().await, Some(ClientEvent::Lost(_)) | None) {}
     }
 }
 

@@ -33,6 +33,8 @@ pub struct BenchOptions {
     pub listen: String,
     /// The broker.
     pub broker: BrokerChoice,
+    /// Other nodes of the cluster that a broker of somebody else is one of, as addresses like its own.
+    pub cluster: Vec<String>,
     /// Whether there is a tap. Without one the device connects to the broker itself.
     pub tap: bool,
     /// Certificate of the tap; without one it speaks plain TCP.
@@ -60,6 +62,7 @@ impl BenchOptions {
         Self {
             listen: "127.0.0.1:0".to_owned(),
             broker: BrokerChoice::Embedded,
+            cluster: Vec::new(),
             tap: true,
             tls: None,
             authority: None,

@@ -12,7 +12,7 @@ use crate::bench::LinkError;
 use crate::bench::endpoint::Endpoint;
 use crate::bench::inbox::inbox;
 use crate::bench::secure::TlsServer;
-use crate::broker::{EmbeddedBroker, Tested, self_test};
+use crate::broker::{Difference, EmbeddedBroker, Tested, self_test};
 use crate::maps::MapServer;
 use crate::tap::{Tap, Upstream};
 use tck_journal::Vantage;
@@ -43,11 +43,11 @@ impl MqttBench {
             embedded: embedded.is_some(),
         };
         let maps = MapServer::start(&options.maps_listen, options.maps_host.as_deref(), reporter.clone()).await?;
-        let mut limits = match self_test(&endpoint, &options.own).await? {
-            Tested::Keeps => Vec::new(),
-            Tested::Forbids(what) => vec![without_own_topics(&what, &endpoint, &options)],
+        let nodes = nodes(&options)?;
+        let (has_own_topics, mut limits) = match self_test(&endpoint, &nodes, &options.own).await? {
+            Tested::Keeps(differences) => (true, borne(&differences, &endpoint, &options)?),
+            Tested::Forbids(what) => (false, vec![without_own_topics(&what, &endpoint, &options)]),
         };
-        let has_own_topics = limits.is_empty();
         let run = uuid::Uuid::new_v4().simple().to_string();
         // Known to nobody on the broker, so that nobody can take it.
         let client_id = options.own.client("");
@@ -119,4 +119,23 @@ impl MqttBench {
         };
         Ok((link, info))
     }
+}
+
+/// The other nodes of the broker's cluster.
+fn nodes(options: &BenchOptions) -> Result<Vec<Endpoint>, LinkError> {
+    let BrokerChoice::External { access, .. } = &options.broker else {
+        return Ok(Vec::new());
+    };
+    options.cluster.iter().map(|url| Endpoint::parse(url, access)).collect()
+}
+
+/// What a broker does differently, as limits of the report.
+fn borne(differences: &[Difference], endpoint: &Endpoint, options: &BenchOptions) -> Result<Vec<String>, LinkError> {
+    for topic in options.device_topics.iter().chain(&options.harness_topics) {
+        if let Some(difference) = differences.iter().find(|difference| difference.spoils(topic)) {
+            let text = format!("{} One of them would be {topic}", difference.limit(&endpoint.url()));
+            return Err(LinkError::Setup(text));
+        }
+    }
+    Ok(differences.iter().map(|one| one.limit(&endpoint.url())).collect())
 }
