@@ -206,7 +206,7 @@ fn every_command_of_a_pipeline_exists_with_its_flags() {
     assert!(count > 15, "{count} commands");
     assert_eq!(
         commands_in("x: |\n  ./t/vda5050-tck run --profile \"$P\" \\\n  --seed $[[ inputs.seed ]] | cat\n"),
-        ["run --profile \"1\"   --seed 1"]
+        ["run --profile \"1\"    --seed 1"]
     );
     assert!(parse("run --profile x --no-such-flag").is_err());
 }
