@@ -101,3 +101,66 @@ fn a_pipeline_has_a_shell_certificates_and_a_user_and_the_other_image_the_progra
         assert!(has(stage, "COPY --from=build /source/target/release/vda5050-tck "));
     }
 }
+
+/// What Containerfile says, with an empty base in the place of images from a registry, and a stand-in for the program that nobody
+/// compiles here.
+fn without_network() -> String {
+    let stand_in = "COPY Containerfile /source/target/release/vda5050-tck";
+    let lines = stages().into_iter().flatten().filter_map(|line| {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        match words.as_slice() {
+            ["FROM", image, rest @ ..] if image.starts_with("docker.io/") => {
+                Some(format!("FROM scratch {}", rest.join(" ")))
+            }
+            ["RUN", "cargo", "build", ..] => Some(stand_in.to_owned()),
+            ["RUN", ..] => None,
+            _ => Some(line),
+        }
+    });
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn a_builder_finds_everything_and_makes_the_image_of_the_program_alone() {
+    let Ok(version) = std::process::Command::new("buildah").arg("--version").output() else {
+        assert!(std::env::var_os("CI").is_none(), "buildah is missing");
+        eprintln!("buildah is missing, and no image is built");
+        return;
+    };
+    assert!(version.status.success());
+    let text = without_network();
+    assert!(
+        text.contains("FROM scratch AS build") && text.contains("release/vda5050-tck"),
+        "{text}"
+    );
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("Containerfile");
+    std::fs::write(&file, text).expect("written");
+    let buildah = |arguments: &[&str]| {
+        let mut command = std::process::Command::new("buildah");
+        command.arg("--root").arg(folder.path().join("root"));
+        command.arg("--runroot").arg(folder.path().join("run"));
+        let ended = command.args(["--storage-driver", "vfs"]).args(arguments).output();
+        let ended = ended.expect("buildah runs");
+        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert!(ended.status.success(), "{arguments:?}: {said}");
+        ended.stdout
+    };
+    let (file, context) = (file.display().to_string(), root().display().to_string());
+    buildah(&[
+        "bud",
+        "--isolation",
+        "chroot",
+        "--file",
+        &file,
+        "--tag",
+        "alone",
+        &context,
+    ]);
+    let image: serde_json::Value =
+        serde_json::from_slice(&buildah(&["inspect", "--type", "image", "alone"])).expect("an image");
+    let config = &image["OCIv1"]["config"];
+    assert_eq!(config["Entrypoint"], serde_json::json!(["/usr/bin/vda5050-tck"]));
+    assert_eq!(config["Cmd"], serde_json::json!(["--help"]));
+    assert_eq!(config["WorkingDir"], "/work");
+}

@@ -52,8 +52,8 @@ pub(super) fn validated(effective: &Effective, library: &Library) -> Result<Stri
     if let Some(known_from) = &plan.known_from {
         let _ = write!(text, "; {}", escaped(known_from));
     }
-    for sentence in plan.floor.iter().flat_map(|floor| &floor.left_out) {
-        let _ = write!(text, "\n  not used: {}", escaped(sentence));
+    for (label, sentence) in plan.floor.iter().flat_map(of_source) {
+        let _ = write!(text, "\n  {label}: {}", escaped(sentence));
     }
     Ok(text)
 }
@@ -70,11 +70,23 @@ pub(super) fn draw(plan: &RunPlan, file: &Path) -> Result<(), Problem> {
         .map_err(|error| Problem::Environment(format!("cannot write {}: {error}", file.display())))
 }
 
+/// What becomes of what the source of a floor has: sentences, and what they are about.
+fn of_source(floor: &Floor) -> impl Iterator<Item = (&'static str, &String)> {
+    let parts = [
+        ("not used", &floor.left_out),
+        ("in orders", &floor.said),
+        ("not in orders", &floor.unsaid),
+    ];
+    parts
+        .into_iter()
+        .flat_map(|(label, all)| all.iter().map(move |sentence| (label, sentence)))
+}
+
 /// What of the floor is not used, and which tests want more of it, with the floor itself.
 fn floor(floor: &Floor) -> String {
     let mut text = String::new();
-    for sentence in &floor.left_out {
-        let _ = writeln!(text, "         not used: {}", escaped(sentence));
+    for (label, sentence) in of_source(floor) {
+        let _ = writeln!(text, "{label:>17}: {}", escaped(sentence));
     }
     if floor.wanting.is_empty() {
         return text;

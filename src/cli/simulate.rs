@@ -236,10 +236,8 @@ fn configured(
         let name = file.display().to_string();
         let text = std::fs::read_to_string(file)
             .map_err(|error| Diagnostic::whole("unreadable", format!("the layout {name} cannot be read: {error}")))?;
-        layout = Some(Layout::from_lif(
-            &Source::new(name, text),
-            device.vehicle_type.as_deref(),
-        )?);
+        let whole = Layout::from_lif(&Source::new(name, text), device.vehicle_type.as_deref())?;
+        layout = Some(whole.commanded_by_another());
     }
     let like = |pack: &Pack| {
         let mut like = ReferenceAgv::new(pack);

@@ -14,7 +14,7 @@ use crate::ui::escaped;
 use tck_audit::Hints;
 use tck_base::diagnostic::{Diagnostic, Source};
 use tck_capture::input::no_plain_text;
-use tck_course::Layout;
+use tck_course::{Edge, Layout, Unheard};
 use tck_explore::Grammar;
 use tck_journal::place;
 use tck_judge::Library;
@@ -266,23 +266,29 @@ fn one(name: &str, bytes: &[u8], judging: &Judging<'_>) -> Result<Found, Problem
 /// Reads a layout for each of its vehicle types: which one is meant is said by the profile that uses it. Gives what it is, and
 /// what looks wrong in it.
 fn layout(source: &Arc<Source>) -> Result<(String, Vec<String>), Vec<Diagnostic>> {
-    let (mut said, mut left_out, mut doubts, mut curves) = (Vec::new(), Vec::new(), Vec::new(), 0);
+    let (mut said, mut left_out, mut doubts) = (Vec::new(), Vec::new(), Vec::new());
     for vehicle_type in Layout::vehicle_types(source)? {
-        let layout = Layout::from_lif(source, Some(&vehicle_type))?;
+        let whole = Layout::from_lif(source, Some(&vehicle_type))?;
+        let layout = whole.fitted(&Unheard);
+        let shown = escaped(&vehicle_type);
         let (nodes, edges) = (layout.nodes().count(), layout.edges().count());
         said.push(format!("{nodes} nodes and {edges} edges for {vehicle_type}"));
         let unused = layout.left_out().iter();
         left_out.extend(unused.map(|sentence| format!("\n  not used for {vehicle_type}: {}", escaped(sentence))));
-        curves += layout.curves();
-        for doubt in layout.doubts() {
+        let unread = whole.unsaid().iter();
+        left_out.extend(unread.map(|sentence| format!("\n  for {shown}: {}", escaped(sentence))));
+        if layout.edges().any(Edge::has_more_to_say) {
+            left_out.push(format!(
+                "\n  for {shown}: curves, orientations, rotation and heights go into orders as far as its factsheet \
+                 lists them; `run --plan` says which"
+            ));
+        }
+        for doubt in whole.doubts() {
             if !doubts.contains(&doubt) {
                 doubts.push(doubt);
             }
         }
     }
-    let mut what = format!("a layout with {}{}", said.join(", "), left_out.concat());
-    if curves > 0 {
-        what.push_str("; a run sends no curve of a layout");
-    }
+    let what = format!("a layout with {}{}", said.join(", "), left_out.concat());
     Ok((what, doubts))
 }

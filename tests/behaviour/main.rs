@@ -27,6 +27,7 @@ mod hostile;
 mod https;
 mod inspecting;
 mod interrupted;
+mod layouts;
 mod messages_only;
 mod mosquitto;
 mod output;

@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Map, Value};
 
+use super::demand::Demand;
 use super::{CourseError, Station};
 use tck_base::diagnostic;
-use tck_base::nurbs::Curve;
 use tck_profile::LayoutList;
 
 /// mapId of [`Layout::built_in`].
@@ -34,6 +34,8 @@ pub struct Node {
     pub deviation_theta: Option<f64>,
     /// Whether loads are handed over here; courses avoid such nodes.
     pub station: bool,
+    /// What every order has to do here.
+    pub demands: Vec<Demand>,
 }
 
 impl Node {
@@ -54,6 +56,7 @@ impl Node {
         put(&mut value, "theta", self.theta);
         put(&mut value, "allowedDeviationXY", self.deviation_xy);
         put(&mut value, "allowedDeviationTheta", self.deviation_theta);
+        put_demands(&mut value, &self.demands);
         value.into()
     }
 }
@@ -63,6 +66,16 @@ fn put(value: &mut Map<String, Value>, name: &str, number: Option<f64>) {
         value.insert(name.into(), number.into());
     }
 }
+
+/// The actions that every order has to have, where there are any.
+fn put_demands(value: &mut Map<String, Value>, demands: &[Demand]) {
+    if !demands.is_empty() {
+        value.insert("demands".into(), demands.iter().map(Demand::value).collect());
+    }
+}
+
+/// What an order says of every edge of which it is known: a speed cap, and what a line-guided vehicle cannot do without.
+const ALWAYS_TOLD: [&str; 2] = ["maxSpeed", "direction"];
 
 /// A way from one node to another, and not back.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -91,6 +104,10 @@ pub struct Edge {
     pub direction: Option<String>,
     /// NURBS, as the layout has it.
     pub trajectory: Option<Value>,
+    /// What every order has to do on it.
+    pub demands: Vec<Demand>,
+    /// The members that an order has beside those it always has, because the vehicle takes them.
+    pub told: Vec<&'static str>,
 }
 
 impl Edge {
@@ -118,20 +135,57 @@ impl Edge {
         if let Some(trajectory) = &self.trajectory {
             value.insert("trajectory".into(), trajectory.clone());
         }
+        put_demands(&mut value, &self.demands);
+        if !self.told.is_empty() {
+            let told = self.told.iter().map(|name| Value::from(*name));
+            value.insert("told".into(), told.collect());
+        }
         value.into()
     }
+}
+
+/// What an order says of an edge beside its ids and its ends, from the value of the edge.
+#[must_use]
+pub fn told_in_order(edge: &Value) -> Map<String, Value> {
+    let told = edge.get("told").and_then(Value::as_array);
+    let told = told.into_iter().flatten().filter_map(Value::as_str);
+    let names = ALWAYS_TOLD.into_iter().chain(told);
+    names
+        .filter_map(|name| Some((name.to_owned(), edge.get(name)?.clone())))
+        .collect()
+}
+
+/// The actions that an order has to have on a node or an edge, from its value; `id` gives each its actionId.
+pub fn demanded_in_order(place: &Value, mut id: impl FnMut() -> String) -> Vec<Value> {
+    let demands = place.get("demands").and_then(Value::as_array);
+    let demands = demands.into_iter().flatten();
+    demands.map(|demand| with_id(demand, id())).collect()
+}
+
+fn with_id(demand: &Value, id: String) -> Value {
+    let mut action = demand.clone();
+    if let Value::Object(members) = &mut action {
+        members.insert("actionId".into(), id.into());
+    }
+    action
 }
 
 /// Everything one vehicle may drive on. Node ids are unique; edges join nodes of it, on one map.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Layout {
-    nodes: BTreeMap<String, Node>,
+    pub(super) nodes: BTreeMap<String, Node>,
     /// By start and end; of parallel edges the first one counts.
-    edges: BTreeMap<(String, String), Edge>,
+    pub(super) edges: BTreeMap<(String, String), Edge>,
     /// Where actions of the profile can be performed, by their names in suites.
     pub(super) stations: BTreeMap<String, Station>,
     /// What the source has and the layout leaves out, one sentence each.
-    left_out: Vec<String>,
+    pub(super) left_out: Vec<String>,
+    /// The file it comes from; empty where it comes from none.
+    pub(super) file: String,
+    /// What the source says of nodes and edges and orders say, one sentence each, once that is known.
+    pub(super) said: Vec<String>,
+    /// What the source says of nodes and edges and no order says, one sentence each.
+    pub(super) unsaid: Vec<String>,
 }
 
 impl Layout {
@@ -143,6 +197,9 @@ impl Layout {
             edges: BTreeMap::new(),
             stations: BTreeMap::new(),
             left_out,
+            file: String::new(),
+            said: Vec::new(),
+            unsaid: Vec::new(),
         };
         for edge in edges {
             let (Some(start), Some(end)) = (layout.nodes.get(&edge.start), layout.nodes.get(&edge.end)) else {
@@ -166,6 +223,14 @@ impl Layout {
         layout
     }
 
+    /// The layout with the file it comes from, and with what that says and nobody reads, one sentence each.
+    #[must_use]
+    pub(super) fn read_from(mut self, file: &str, unread: Vec<String>) -> Self {
+        file.clone_into(&mut self.file);
+        self.unsaid = unread;
+        self
+    }
+
     /// The short list of a profile, which has been checked when it was read.
     #[must_use]
     pub fn from_list(list: &LayoutList) -> Self {
@@ -178,6 +243,7 @@ impl Layout {
             deviation_xy: node.deviation_xy,
             deviation_theta: node.deviation_theta,
             station: false,
+            demands: Vec::new(),
         });
         let edges = list.edges.iter().map(|edge| Edge {
             id: edge.id.clone(),
@@ -208,6 +274,7 @@ impl Layout {
                     deviation_xy: None,
                     deviation_theta: None,
                     station: column == "E",
+                    demands: Vec::new(),
                 });
             }
         }
@@ -327,9 +394,7 @@ impl Layout {
     /// The way over an edge as points in metres, both ends included: along its curve where it has one that can be calculated with.
     #[must_use]
     pub fn line(&self, edge: &Edge) -> Vec<(f64, f64)> {
-        let trajectory = edge.trajectory.as_ref();
-        let curve = trajectory.and_then(|trajectory| Curve::read(trajectory).0);
-        if let Some(curve) = curve {
+        if let Some((Some(curve), _)) = edge.curve() {
             return curve.path().points().collect();
         }
         let ends = [self.node(&edge.start), self.node(&edge.end)];
@@ -340,6 +405,18 @@ impl Layout {
     #[must_use]
     pub fn has_station(&self, name: &str) -> bool {
         self.stations.contains_key(name)
+    }
+
+    /// What the source says of nodes and edges and orders say, one sentence each; nothing before [`Layout::fitted`].
+    #[must_use]
+    pub fn said(&self) -> &[String] {
+        &self.said
+    }
+
+    /// What the source says of nodes and edges and no order says, one sentence each.
+    #[must_use]
+    pub fn unsaid(&self) -> &[String] {
+        &self.unsaid
     }
 
     /// What the source has and the layout leaves out, one sentence each, for the report.

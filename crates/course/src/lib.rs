@@ -8,8 +8,10 @@
 
 mod assign;
 mod curve;
+mod demand;
 mod doubts;
 mod drawing;
+mod fit;
 mod graph;
 mod layout;
 mod lif;
@@ -22,7 +24,9 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value};
 
-pub use layout::{BUILT_IN_MAP, BUILT_IN_UPPER_MAP, Edge, Layout, Node};
+pub use demand::Demand;
+pub use fit::{Scope, Taken, Takes, Unheard};
+pub use layout::{BUILT_IN_MAP, BUILT_IN_UPPER_MAP, Edge, Layout, Node, demanded_in_order, told_in_order};
 pub use ways::Station;
 
 use tck_base::diagnostic::{Diagnostic, Source};

@@ -18,7 +18,8 @@ fn fixture(name: &str) -> Arc<Source> {
 }
 
 fn hall() -> Layout {
-    Layout::from_lif(&fixture("hall.lif.json"), Some("ACME.Carrier")).expect("a layout")
+    let hall = Layout::from_lif(&fixture("hall.lif.json"), Some("ACME.Carrier"));
+    hall.expect("a layout").fitted(&Unheard)
 }
 
 fn one_way_loop() -> Layout {
@@ -231,11 +232,11 @@ fn a_layout_gives_its_vehicle_type_what_it_may_drive_on() {
     assert_eq!(edge.orientation_type.as_deref(), Some("TANGENTIAL"));
     insta::assert_snapshot!(layout.left_out().join("\n"), @r"
     node G1 is not for this vehicle type
-    node W1 demands the action openGate
     edge H4-G1 is not for this vehicle type
     edge H1-H5 is not for an empty vehicle
-    edge H6-W1 leads to or from a node the vehicle may not use
     edge H1-U1 leads to another map
+    node W1 demands the action openGate: the factsheet of the vehicle has to list it
+    edge H6-W1 leads to or from a node the vehicle may not use
     ");
 }
 
@@ -350,6 +351,7 @@ fn a_huge_floor_is_given_up_rather_than_searched_for_ever() {
         deviation_xy: None,
         deviation_theta: None,
         station: false,
+        demands: Vec::new(),
     };
     // Two halves, each joined completely, with ways across from a to b only: a six-loop through both is not possible.
     let nodes: Vec<Node> = (0..60).map(node).collect();
@@ -471,6 +473,7 @@ fn floor_and_need() -> impl Strategy<Value = (Layout, CourseNeed)> {
             deviation_xy: None,
             deviation_theta: None,
             station: at == 7,
+            demands: Vec::new(),
         });
         let edges = edges.iter().filter(|(from, to)| from != to).map(|(from, to)| Edge {
             id: format!("{from}-{to}"),

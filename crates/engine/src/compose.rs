@@ -160,7 +160,12 @@ impl Composer {
                 route,
                 actions: placed.into_values().collect(),
             };
-            let (nodes, edges) = builder.build(&order, &mut self.orders)?;
+            let (count, ids, run) = (&mut self.action_count, self.ids, &self.run);
+            let mut fresh = || {
+                *count += 1;
+                ids.of_action(run, *count)
+            };
+            let (nodes, edges) = builder.build(&order, &mut self.orders, &mut fresh)?;
             message.insert("nodes".to_owned(), nodes);
             message.insert("edges".to_owned(), edges);
         }

@@ -1,15 +1,22 @@
 //! From course names to the nodes and edges of an order, with sequenceIds that run on through updates.
 
+use std::collections::BTreeMap;
+
 use serde_json::{Map, Value, json};
 
 use super::compose_error::ComposeError;
-use tck_course::is_station;
+use tck_course::{demanded_in_order, is_station, told_in_order};
 use tck_profile::{Place, SampleKind};
 use tck_suite::model::{Route, RoutePlace};
 
 /// The ways sent in this test, latest last.
 #[derive(Debug, Default)]
-pub(super) struct SentOrders(Vec<(String, Vec<Visited>)>);
+pub(super) struct SentOrders {
+    ways: Vec<(String, Vec<Visited>)>,
+    /// The actionIds of what the layout demands: an update that has a node again has its actions again. By orderId,
+    /// sequenceId and place in the list.
+    demanded: BTreeMap<(String, u32, usize), String>,
+}
 
 /// One node of an order that was sent.
 #[derive(Clone, Debug)]
@@ -23,10 +30,26 @@ impl SentOrders {
     /// The sequenceId an update that begins at `name` continues with: that of the last base node of this
     /// name in the latest message of the order, then in older ones; 0 for a new order.
     fn continues_at(&self, order: &str, name: &str) -> u32 {
-        let ways = self.0.iter().rev().filter(|(id, _)| id == order);
+        let ways = self.ways.iter().rev().filter(|(id, _)| id == order);
         let mut found =
             ways.filter_map(|(_, nodes)| nodes.iter().rev().find(|node| node.released && node.name == name));
         found.next().map_or(0, |node| node.sequence_id)
+    }
+
+    /// What the layout demands on a node or an edge, before the actions of the test.
+    fn demanded(
+        &mut self,
+        place: &Value,
+        order: &str,
+        sequence_id: u32,
+        fresh: &mut dyn FnMut() -> String,
+    ) -> Vec<Value> {
+        let mut at = 0;
+        demanded_in_order(place, || {
+            at += 1;
+            let known = self.demanded.entry((order.to_owned(), sequence_id, at));
+            known.or_insert_with(&mut *fresh).clone()
+        })
     }
 }
 
@@ -59,8 +82,13 @@ pub(super) struct RouteBuilder<'a> {
 }
 
 impl RouteBuilder<'_> {
-    /// The arrays `nodes` and `edges`.
-    pub(super) fn build(self, order: &str, sent: &mut SentOrders) -> Result<(Value, Value), ComposeError> {
+    /// The arrays `nodes` and `edges`; `fresh` makes actionIds for what the layout demands.
+    pub(super) fn build(
+        self,
+        order: &str,
+        sent: &mut SentOrders,
+        fresh: &mut dyn FnMut() -> String,
+    ) -> Result<(Value, Value), ComposeError> {
         let route = self.route;
         let names: Vec<(&str, bool)> = route
             .base
@@ -92,11 +120,17 @@ impl RouteBuilder<'_> {
                 if stop.names.iter().any(|name| is_on_edge(name)) {
                     on_edge.append(&mut actions);
                 }
-                edges.push(self.edge(before, last, sequence_id.saturating_sub(1), stop.released, on_edge)?);
+                let sequence_id = sequence_id.saturating_sub(1);
+                let place = self.edge_value(before, last)?;
+                let mut all = sent.demanded(place, order, sequence_id, fresh);
+                all.append(&mut on_edge);
+                edges.push(self.edge(before, last, sequence_id, stop.released, all)?);
             }
-            nodes.push(self.node(last, sequence_id, stop.released, actions)?);
+            let mut all = sent.demanded(self.node_value(last)?, order, sequence_id, fresh);
+            all.append(&mut actions);
+            nodes.push(self.node(last, sequence_id, stop.released, all)?);
         }
-        sent.0.push((order.to_owned(), visited));
+        sent.ways.push((order.to_owned(), visited));
         Ok((Value::Array(nodes), Value::Array(edges)))
     }
 
@@ -143,10 +177,18 @@ impl RouteBuilder<'_> {
         self.course?.get(group)?.get(name)
     }
 
+    fn node_value(&self, name: &str) -> Result<&Value, ComposeError> {
+        let missing = || ComposeError::Course(format!("node `{name}`"));
+        self.member("nodes", name).ok_or_else(missing)
+    }
+
+    fn edge_value(&self, from: &str, to: &str) -> Result<&Value, ComposeError> {
+        let missing = || ComposeError::Course(format!("edge `{from}-{to}`"));
+        self.member("edges", &format!("{from}-{to}")).ok_or_else(missing)
+    }
+
     fn node(&self, name: &str, sequence_id: u32, released: bool, actions: Vec<Value>) -> Result<Value, ComposeError> {
-        let place = self
-            .member("nodes", name)
-            .ok_or_else(|| ComposeError::Course(format!("node `{name}`")))?;
+        let place = self.node_value(name)?;
         let mut node = json!({
             "nodeId": place.get("id"),
             "sequenceId": sequence_id,
@@ -178,8 +220,7 @@ impl RouteBuilder<'_> {
         released: bool,
         actions: Vec<Value>,
     ) -> Result<Value, ComposeError> {
-        let missing = || ComposeError::Course(format!("edge `{from}-{to}`"));
-        let edge = self.member("edges", &format!("{from}-{to}")).ok_or_else(missing)?;
+        let edge = self.edge_value(from, to)?;
         let end = |name: &str| {
             self.member("nodes", name)
                 .and_then(|node| node.get("id"))
@@ -195,9 +236,7 @@ impl RouteBuilder<'_> {
             "actions": actions,
         });
         if let Value::Object(built) = &mut built {
-            // What else the layout knows of an edge is optional in an order: only a speed cap is worth sending, and
-            // what a line-guided vehicle cannot do without.
-            built.extend(members(edge, &["maxSpeed", "direction"]));
+            built.extend(told_in_order(edge));
         }
         Ok(built)
     }
@@ -248,7 +287,14 @@ mod tests {
             route: &route,
             actions: vec![(RoutePlace::Node(place.to_owned()), vec![json!("work")])],
         };
-        builder.build("o", &mut SentOrders::default()).expect("a way")
+        let mut count = 0;
+        let mut fresh = || {
+            count += 1;
+            format!("demanded-{count}")
+        };
+        builder
+            .build("o", &mut SentOrders::default(), &mut fresh)
+            .expect("a way")
     }
 
     fn of(list: &Value, member: &str) -> Vec<Value> {
@@ -283,5 +329,49 @@ mod tests {
         assert_eq!(of(&nodes, "nodeId"), ["n3"]);
         assert_eq!(of(&nodes, "actions"), [json!(["work"])]);
         assert_eq!(edges, json!([]));
+    }
+
+    #[test]
+    fn what_a_layout_says_and_demands_is_in_every_order_under_the_same_ids() {
+        let mut course = course();
+        let beep = json!({ "actionType": "beep", "blockingType": "NONE", "actionParameters": [] });
+        course["nodes"]["b"] = json!({ "id": "n9", "x": 0.0, "demands": [beep, beep] });
+        course["edges"]["a-b"] = json!({ "id": "e9", "maxSpeed": 1.0, "orientation": 0.5, "rotationAllowed": false,
+            "demands": [beep], "told": ["orientation"] });
+        let route = Route {
+            base: vec!["a".to_owned(), "b".to_owned()],
+            horizon: Vec::new(),
+            from: None,
+            actions: Vec::new(),
+            span: Span::new(&Source::new("test", ""), 0, 0),
+        };
+        let (mut count, mut sent) = (0, SentOrders::default());
+        let mut fresh = || {
+            count += 1;
+            format!("demanded-{count}")
+        };
+        let mut order = |id: &str| {
+            let builder = RouteBuilder {
+                course: Some(&course),
+                route: &route,
+                actions: vec![(RoutePlace::Node("b".to_owned()), vec![json!({ "actionId": "work" })])],
+            };
+            builder.build(id, &mut sent, &mut fresh).expect("a way")
+        };
+        let (nodes, edges) = order("o");
+        assert_eq!(
+            of(&nodes[1]["actions"], "actionId"),
+            ["demanded-2", "demanded-3", "work"]
+        );
+        assert_eq!(edges[0]["orientation"], 0.5);
+        assert_eq!(edges[0]["maxSpeed"], 1.0);
+        assert_eq!(edges[0].get("rotationAllowed"), None);
+        assert_eq!(edges[0]["actions"][0]["actionType"], "beep");
+        assert_eq!(edges[0]["actions"][0]["actionId"], "demanded-1");
+        assert_eq!(order("o"), (nodes, edges), "the same order once more");
+        assert_eq!(
+            of(&order("p").0[1]["actions"], "actionId"),
+            ["demanded-5", "demanded-6", "work"]
+        );
     }
 }

@@ -68,6 +68,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         if let Some(why) = self.is_another() {
             return Ok(Err(why));
         }
+        self.setup.fit_layout();
         self.active_map()?;
         self.home.first = self.engine.recorder.judge().state();
         self.home.before.clone_from(&self.home.first);

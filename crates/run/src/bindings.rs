@@ -12,7 +12,7 @@ use tck_journal::Reason;
 use tck_journal::event::{Event, Packet};
 use tck_judge::RunJudge;
 use tck_pack::Role;
-use tck_suite::model::Test;
+use tck_suite::model::{Need, Test};
 
 /// Margin on one and a half keep-alives for the last will, in milliseconds.
 const WILL_MARGIN: u64 = 3_000;
@@ -95,8 +95,32 @@ pub(super) fn course_of(
         return Err(Reason::observed(COLLAPSES));
     }
     let mut course = course.bindings();
+    if says_edges_itself(test) {
+        tell_nothing(&mut course);
+    }
     Pace::of(judge.ground().factsheet().as_deref()).set(&mut course);
     Ok(Some(flat(course)))
+}
+
+/// Whether a test is about what an order says of an edge, beside its speed: it says that itself, and nothing of a layout comes in
+/// between.
+fn says_edges_itself(test: &Test) -> bool {
+    test.needs.iter().any(|need| match need {
+        Need::Optional(path) | Need::NoOptional(path) | Need::NotRequired(path) => {
+            path.starts_with("order.edges.") && path != "order.edges.maxSpeed"
+        }
+        _ => false,
+    })
+}
+
+/// Takes from every edge what a vehicle would take beside what orders always say.
+fn tell_nothing(course: &mut Value) {
+    let edges = course.get_mut("edges").and_then(Value::as_object_mut);
+    for edge in edges.into_iter().flat_map(Map::values_mut) {
+        if let Value::Object(edge) = edge {
+            edge.remove("told");
+        }
+    }
 }
 
 /// The variables only this test has.

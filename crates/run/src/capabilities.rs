@@ -180,7 +180,8 @@ impl Capabilities {
         })
     }
 
-    fn action(&self, name: &str, scope: Option<&str>) -> Gate {
+    /// Whether it can do an action, in this scope or in any.
+    pub(super) fn action(&self, name: &str, scope: Option<&str>) -> Gate {
         let whole = action_name(name, None);
         let names = match scope {
             Some(_) => vec![action_name(name, scope), whole],
@@ -203,7 +204,8 @@ impl Capabilities {
         Gate::Runs
     }
 
-    fn optional(&self, path: &str) -> Gate {
+    /// Whether it takes an optional member.
+    pub(super) fn optional(&self, path: &str) -> Gate {
         self.declared(&[format!("optional {path}")], |sheet| sheet.has_optional(path))
     }
 
@@ -323,6 +325,25 @@ fn reverse(gate: Gate, name: &str) -> Gate {
     }
 }
 
+/// A vehicle without a factsheet and without a word in the profile.
+#[cfg(test)]
+pub(crate) fn unknown() -> Capabilities {
+    Capabilities {
+        factsheet: None,
+        statements: BTreeMap::new(),
+        samples: Map::new(),
+        claims: BTreeMap::new(),
+        vantage: Vantage::Subscriber,
+        hooks: Vec::new(),
+        unattended: Vec::new(),
+        maps: Ok(()),
+        map_file: Ok(()),
+        motion: Ok(()),
+        second_vehicle: true,
+        claims_add: true,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -334,16 +355,7 @@ mod tests {
         Capabilities {
             factsheet: factsheet.map(|sheet| Sheet::read(&sheet, &Names::default())),
             statements: BTreeMap::from([("node-bound".to_owned(), false)]),
-            samples: Map::new(),
-            claims: BTreeMap::new(),
-            vantage: Vantage::Subscriber,
-            hooks: Vec::new(),
-            unattended: Vec::new(),
-            maps: Ok(()),
-            map_file: Ok(()),
-            motion: Ok(()),
-            second_vehicle: true,
-            claims_add: true,
+            ..unknown()
         }
     }
 

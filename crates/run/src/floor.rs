@@ -27,6 +27,12 @@ pub struct Floor {
     /// What the source has and is not used, one sentence each.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<String>,
+    /// What the source says of nodes and edges and orders say, one sentence each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub said: Vec<String>,
+    /// What the source says of nodes and edges and no order says, one sentence each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unsaid: Vec<String>,
     /// What wants more floor, the most tests first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub wanting: Vec<Wanting>,
@@ -82,6 +88,8 @@ impl Floor {
             text: layout.as_text(),
             svg: layout.as_svg(),
             left_out: layout.left_out().to_vec(),
+            said: layout.said().to_vec(),
+            unsaid: layout.unsaid().to_vec(),
             wanting,
         }
     }

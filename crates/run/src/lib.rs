@@ -19,6 +19,7 @@ mod draw;
 mod estimate;
 mod factsheet_limits;
 mod files;
+mod fitting;
 mod floor;
 mod header;
 pub mod hooks;

@@ -135,6 +135,9 @@ impl RunPlan {
         if subject.role == Role::Agv {
             by_risk(&mut setup.tests, vocabulary, true);
         }
+        if subject.role == Role::Agv {
+            setup.fit_layout();
+        }
         let gate = |test: &Test| gate(&setup, test);
         let may_run = |test: &Test| matches!(gate(test).0, Waits::Runs | Waits::DependsOnDevice);
         let all = setup.tests.len();

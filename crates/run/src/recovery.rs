@@ -8,7 +8,7 @@ use super::lasting::{self, Idle, has_ended, is_stalled, lasting};
 use super::reset::power_cycle;
 use super::session::Session;
 use tck_base::clock::Moment;
-use tck_course::{Edge, Layout};
+use tck_course::{Edge, Layout, demanded_in_order, told_in_order};
 use tck_engine::{EngineError, Operator};
 use tck_journal::event::Event;
 use tck_judge::RunJudge;
@@ -31,34 +31,33 @@ fn last_order_never_showed(judge: &RunJudge, since: Moment) -> bool {
         })
 }
 
-/// The nodes and edges of an order over this way; `None` where a node of it is not in the layout.
-fn order_over(layout: &Layout, way: &[Edge]) -> Option<(Value, Value)> {
+/// The nodes and edges of an order over this way, with fresh actionIds for what the layout demands; `None` where a node of it is
+/// not in the layout.
+fn order_over(layout: &Layout, way: &[Edge], mut fresh: impl FnMut() -> String) -> Option<(Value, Value)> {
     let ids = way.first().map(|edge| &edge.start).into_iter();
     let ids = ids.chain(way.iter().map(|edge| &edge.end)).enumerate();
     let nodes = ids.map(|(at, id)| {
         let node = layout.node(id)?;
         Some(json!({
-            "nodeId": id, "sequenceId": 2 * at, "released": true, "actions": [],
+            "nodeId": id, "sequenceId": 2 * at, "released": true,
+            "actions": demanded_in_order(&node.value(), &mut fresh),
             "nodePosition": { "x": node.x, "y": node.y, "mapId": node.map_id },
         }))
     });
+    let nodes = nodes.collect::<Option<Vec<_>>>()?;
     let edges = way.iter().enumerate().map(|(at, edge)| {
+        let known = edge.value();
         let mut sent = json!({
-            "edgeId": edge.id, "sequenceId": 2 * at + 1, "released": true, "actions": [],
+            "edgeId": edge.id, "sequenceId": 2 * at + 1, "released": true,
+            "actions": demanded_in_order(&known, &mut fresh),
             "startNodeId": edge.start, "endNodeId": edge.end,
         });
-        let known = edge.value();
-        for member in ["maxSpeed", "direction"] {
-            if let Some(value) = known.get(member) {
-                sent[member] = value.clone();
-            }
+        if let Value::Object(members) = &mut sent {
+            members.extend(told_in_order(&known));
         }
         sent
     });
-    Some((
-        nodes.collect::<Option<Vec<_>>>()?.into(),
-        edges.collect::<Vec<_>>().into(),
-    ))
+    Some((nodes.into(), edges.collect::<Vec<_>>().into()))
 }
 
 /// How often a device is restarted that floods the harness.
@@ -284,8 +283,9 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         let Some(node) = node else { return Ok(()) };
         self.rung("an order of one node, where it stands")?;
         let position = json!({ "x": node.x, "y": node.y, "mapId": node.map_id });
+        let actions = demanded_in_order(&node.value(), || self.engine.composer.action_id());
         let nodes = json!([{
-            "nodeId": node.id, "sequenceId": 0, "released": true, "nodePosition": position, "actions": [],
+            "nodeId": node.id, "sequenceId": 0, "released": true, "nodePosition": position, "actions": actions,
         }]);
         self.order(nodes, json!([])).await?;
         self.shows_own_order().await?;
@@ -345,7 +345,8 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         let Some(end) = way.last().map(|edge| edge.end.clone()) else {
             return Ok(());
         };
-        let Some((nodes, edges)) = order_over(layout, &way) else {
+        let composer = &mut self.engine.composer;
+        let Some((nodes, edges)) = order_over(layout, &way, || composer.action_id()) else {
             return Ok(());
         };
         let text = format!("the vehicle is driven to node {end:?}, from where {} fits", test.id);

@@ -93,7 +93,10 @@ impl DeviceUnderTest {
         let profile = &effective.profile;
         let device = &profile.device;
         let subject = subject(profile)?;
-        let layout = Layout::of_profile(profile)?;
+        let layout = Layout::of_profile(profile)?.map(|layout| match subject.role {
+            Role::Agv => layout,
+            Role::MasterControl => layout.commanded_by_another(),
+        });
         let fleet = match subject.role {
             Role::Agv => None,
             Role::MasterControl => {

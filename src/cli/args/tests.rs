@@ -220,3 +220,51 @@ fn every_command_in_an_example_for_a_scheduler_is_one() {
     let line = "vda5050-tck run --shard ${{ matrix.part }}/4 --out \"a/$PART\" ${MORE:-} \"$@\" || code=$?";
     assert_eq!(deployed(line), ["run --shard 1/4 --out \"a/1\" 1 \"1\""]);
 }
+
+/// The files with commands that CI cannot run, since they need GitHub, GitLab or a device.
+const PIPELINES: [&str; 5] = [
+    ".github/workflows/ci.yml",
+    ".github/workflows/release.yml",
+    "action.yml",
+    "templates/conformance.yml",
+    "docs/ci.md",
+];
+
+/// Every command line of this program in a text. What is filled in later is `1`: a number, a name and a path.
+fn commands_in(text: &str) -> Vec<String> {
+    let call = regex::Regex::new(r#"(?:cargo run --locked --|"\$tool"|(?:\S*/)?vda5050-tck) +([a-z][^\n;&|>#`]*)"#);
+    let later = regex::Regex::new(r"\$\[\[[^\]]*\]\]|\$\{\{[^}]*\}\}|\$\{?[A-Za-z_]+\}?").expect("a pattern");
+    let joined = text.replace("\\\n", " ");
+    let call = call.expect("a pattern");
+    let lines = joined.lines().filter(|line| !line.trim_start().starts_with('#'));
+    let calls = lines.flat_map(|line| {
+        call.captures_iter(line)
+            .map(|found| found[1].to_owned())
+            .collect::<Vec<_>>()
+    });
+    calls
+        .map(|call| later.replace_all(&call, "1").trim_end().to_owned())
+        .collect()
+}
+
+#[test]
+fn every_command_of_a_pipeline_exists_with_its_flags() {
+    let mut count = 0;
+    for path in PIPELINES {
+        let text = std::fs::read_to_string(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).expect(path);
+        let commands = commands_in(&text);
+        assert!(!commands.is_empty(), "{path}");
+        for command in commands {
+            // The name of a shell stands for what is filled in.
+            let command = command.replace("completions \"1\"", "completions bash");
+            parse(&command).unwrap_or_else(|error| panic!("{path}: {command}: {error}"));
+            count += 1;
+        }
+    }
+    assert!(count > 15, "{count} commands");
+    assert_eq!(
+        commands_in("x: |\n  ./t/vda5050-tck run --profile \"$P\" \\\n  --seed $[[ inputs.seed ]] | cat\n"),
+        ["run --profile \"1\"    --seed 1"]
+    );
+    assert!(parse("run --profile x --no-such-flag").is_err());
+}

@@ -1,14 +1,18 @@
-//! LIF 1.0, the layout interchange format of the VDMA: what of a layout one type of vehicle may drive on.
+//! LIF, the layout interchange format of the VDMA: what of a layout one type of vehicle may drive on. Version 1.0 is read, and
+//! the drafts of version 2 as far as they say the same; what is not read is named.
 //!
 //! A vehicle will drive by these numbers, so a file that looks wrong is refused rather than guessed at: degrees
 //! where radians should be, millimetres where metres should be.
 
-use std::collections::BTreeSet;
+mod file;
+
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use serde::Deserialize;
 use serde_json::Value;
 
+use self::file::{EdgeProperties, File, FileEdge, FileLayout, FileNode, Position, Requirement, about_driving};
+use super::demand::Demand;
 use super::layout::{Edge, Layout, Node};
 use tck_base::diagnostic::{self, Diagnostic, Source, Span};
 
@@ -17,90 +21,6 @@ const LARGEST: f64 = 10_000.0;
 
 /// A file in the wrong unit has one mistake per node; nobody reads more of them than this.
 const MOST_MISTAKES: usize = 20;
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct File {
-    layouts: Vec<FileLayout>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct FileLayout {
-    layout_id: String,
-    nodes: Vec<FileNode>,
-    edges: Vec<FileEdge>,
-    #[serde(default)]
-    stations: Vec<Station>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct FileNode {
-    node_id: String,
-    map_id: Option<String>,
-    node_position: Position,
-    vehicle_type_node_properties: Vec<NodeProperties>,
-}
-
-#[derive(Deserialize)]
-struct Position {
-    x: f64,
-    y: f64,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct NodeProperties {
-    vehicle_type_id: String,
-    theta: Option<f64>,
-    #[serde(default)]
-    actions: Vec<Action>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct Action {
-    action_type: String,
-    requirement_type: Option<String>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct FileEdge {
-    edge_id: String,
-    start_node_id: String,
-    end_node_id: String,
-    vehicle_type_edge_properties: Vec<EdgeProperties>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct EdgeProperties {
-    vehicle_type_id: String,
-    vehicle_orientation: Option<f64>,
-    orientation_type: Option<String>,
-    rotation_allowed: Option<bool>,
-    max_speed: Option<f64>,
-    max_rotation_speed: Option<f64>,
-    min_height: Option<f64>,
-    max_height: Option<f64>,
-    load_restriction: Option<LoadRestriction>,
-    #[serde(default)]
-    actions: Vec<Action>,
-    trajectory: Option<Value>,
-}
-
-#[derive(Deserialize)]
-struct LoadRestriction {
-    unloaded: bool,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct Station {
-    interaction_node_ids: Vec<String>,
-}
 
 impl Layout {
     /// The vehicle types a layout file is for. At least one, so that reading for each of them reads something.
@@ -113,12 +33,12 @@ impl Layout {
         if types.is_empty() {
             choose_type(source, &file, None)?;
         }
-        Ok(types.into_iter().map(str::to_owned).collect())
+        Ok(types.into_iter().collect())
     }
 
     /// Reads what `vehicle_type` may drive on; the one type in the file unless said. Nodes and edges of other
-    /// types, edges an empty vehicle must not use, and those that demand an action are left out, which
-    /// [`Layout::left_out`] tells.
+    /// types and what an empty vehicle must not use are left out, which [`Layout::left_out`] tells. What demands an action is
+    /// there, until [`Layout::fitted`] says whether the vehicle can do it.
     ///
     /// # Errors
     /// The first mistakes, each naming its node or edge.
@@ -131,60 +51,103 @@ impl Layout {
             nodes: Vec::new(),
             edges: Vec::new(),
             left_out: Vec::new(),
+            unread: BTreeMap::new(),
             wrong: Vec::new(),
         };
         reader.check_ids(&file);
-        for layout in &file.layouts {
+        for layout in file.layouts() {
             reader.layout(layout);
         }
         if !reader.wrong.is_empty() {
             return Err(reader.wrong);
         }
-        Ok(Self::assemble(reader.nodes, reader.edges, reader.left_out))
+        // Of parallel edges the first one counts: rather one that demands nothing.
+        reader.edges.sort_by_key(|edge| !edge.demands.is_empty());
+        let unread = reader.unread.into_iter().map(Unread::sentence).collect();
+        Ok(Self::assemble(reader.nodes, reader.edges, reader.left_out).read_from(&source.name, unread))
     }
 }
 
+/// What of nodes or edges is not read or not sent, and what is said about it.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Unread {
+    what: String,
+    of: &'static str,
+    why: &'static str,
+}
+
+impl Unread {
+    fn sentence((this, count): (Self, usize)) -> String {
+        let Self { what, of, why } = this;
+        let s = if count == 1 { "" } else { "s" };
+        format!("{what} of {count} {of}{s} {why}")
+    }
+}
+
+/// Nothing here knows the member.
+const NOT_READ: &str = "is not read";
+/// Orders have no member for it.
+const NO_WORD: &str = "goes into no order, for orders have no word for it";
+/// Orders have a member for one of them.
+const ONE_WORD: &str = "goes into no order, for an order has one";
+/// Nobody can know when.
+const NOT_SENT: &str = "goes into no order, for it depends on more than the layout says";
+
 impl File {
     fn read(source: &Arc<Source>) -> Result<Self, Vec<Diagnostic>> {
-        serde_json::from_str(&source.text).map_err(|error| {
-            if let Some(version) = other_version(&source.text) {
-                let title = format!("a layout of LIF {version}; LIF 1.0 is read");
-                return vec![Diagnostic::new("lif", Span::new(source, 0, 0), title, "in this file")];
-            }
+        let version = named_version(&source.text);
+        let major = version.as_deref().and_then(|version| version.split('.').next());
+        if let Some(version) = version.as_deref().filter(|_| !matches!(major, Some("0" | "1" | "2"))) {
+            let title = format!("a layout of LIF {version}; LIF 1.0 is read, and drafts of LIF 2");
+            return Err(vec![Diagnostic::new(
+                "lif",
+                Span::new(source, 0, 0),
+                title,
+                "in this file",
+            )]);
+        }
+        let format = if major == Some("2") { "2" } else { "1.0" };
+        let no_layout = |span: Span, label: &str| {
+            let title = format!("this is not a layout in the format LIF {format}");
+            vec![Diagnostic::new("lif", span, title, label)]
+        };
+        let file: Self = serde_json::from_str(&source.text).map_err(|error| {
             let at = offset(&source.text, error.line(), error.column());
             let message = error.to_string();
             let label = message
                 .rsplit_once(" at line ")
                 .map_or(message.as_str(), |(label, _)| label);
-            let span = Span::new(source, at.saturating_sub(1), at);
-            vec![Diagnostic::new(
-                "lif",
-                span,
-                "this is not a layout in the format LIF 1.0",
-                label,
-            )]
-        })
+            no_layout(Span::new(source, at.saturating_sub(1), at), label)
+        })?;
+        if file.has_layouts() {
+            Ok(file)
+        } else {
+            Err(no_layout(Span::new(source, 0, 0), "missing field `layouts`"))
+        }
     }
 
     /// The vehicle types that some node is for.
-    fn vehicle_types(&self) -> BTreeSet<&str> {
-        let nodes = self.layouts.iter().flat_map(|layout| &layout.nodes);
-        nodes
-            .flat_map(|node| &node.vehicle_type_node_properties)
-            .map(|properties| properties.vehicle_type_id.as_str())
-            .collect()
+    fn vehicle_types(&self) -> BTreeSet<String> {
+        let nodes = self.layouts().flat_map(|layout| &layout.nodes);
+        let properties = nodes.flat_map(|node| &node.vehicle_type_node_properties);
+        properties.flat_map(file::NodeProperties::types).collect()
     }
 }
 
-/// The version a file names, where it is another one than is read.
-fn other_version(text: &str) -> Option<String> {
-    let file: Value = serde_json::from_str(text).ok()?;
-    let version = file.pointer("/metaInformation/lifVersion")?.as_str()?;
-    let is_read = version
-        .split('.')
-        .next()
-        .is_some_and(|major| major == "0" || major == "1");
-    (!is_read).then(|| version.chars().take(32).collect())
+/// The version that a file names.
+fn named_version(text: &str) -> Option<String> {
+    #[derive(serde::Deserialize)]
+    #[serde(rename_all = "camelCase")]
+    struct Head {
+        meta_information: Meta,
+    }
+    #[derive(serde::Deserialize)]
+    #[serde(rename_all = "camelCase")]
+    struct Meta {
+        lif_version: String,
+    }
+    let head: Head = serde_json::from_str(text).ok()?;
+    Some(head.meta_information.lif_version.chars().take(32).collect())
 }
 
 /// Byte offset of a line and a column, both counted from 1.
@@ -207,9 +170,9 @@ fn choose_type(source: &Arc<Source>, file: &File, wanted: Option<&str>) -> Resul
         (Some(wanted), _) if types.contains(wanted) => Ok(wanted.to_owned()),
         (Some(wanted), _) => Err(refuse(
             format!("no node has vehicleTypeNodeProperties for `{wanted}`"),
-            diagnostic::did_you_mean(wanted, types.iter().copied()),
+            diagnostic::did_you_mean(wanted, types.iter().map(String::as_str)),
         )),
-        (None, Some(only)) if types.len() == 1 => Ok((*only).to_owned()),
+        (None, Some(only)) if types.len() == 1 => Ok(only.clone()),
         (None, None) => Err(refuse(
             "no node has vehicleTypeNodeProperties".to_owned(),
             "a node needs `vehicleTypeNodeProperties` for the vehicle to use it".to_owned(),
@@ -218,7 +181,7 @@ fn choose_type(source: &Arc<Source>, file: &File, wanted: Option<&str>) -> Resul
             "the layout is for several vehicle types".to_owned(),
             format!(
                 "name one with `vehicle-type`: {}",
-                types.iter().copied().collect::<Vec<_>>().join(", ")
+                types.iter().map(String::as_str).collect::<Vec<_>>().join(", ")
             ),
         )),
     }
@@ -230,6 +193,8 @@ struct Reader<'s> {
     nodes: Vec<Node>,
     edges: Vec<Edge>,
     left_out: Vec<String>,
+    /// How many nodes or edges have it.
+    unread: BTreeMap<Unread, usize>,
     wrong: Vec<Diagnostic>,
 }
 
@@ -266,14 +231,14 @@ impl Reader<'_> {
 
     fn check_ids(&mut self, file: &File) {
         let mut seen = BTreeSet::new();
-        for node in file.layouts.iter().flat_map(|layout| &layout.nodes) {
+        for node in file.layouts().flat_map(|layout| &layout.nodes) {
             if !seen.insert(node.node_id.as_str()) && !self.is_enough() {
                 let title = format!("there are two nodes `{}`", node.node_id);
                 let span = self.span("nodeId", &node.node_id, 1);
                 self.wrong.push(Diagnostic::new("lif", span, title, "the second one"));
             }
         }
-        for edge in file.layouts.iter().flat_map(|layout| &layout.edges) {
+        for edge in file.layouts().flat_map(|layout| &layout.edges) {
             for end in [&edge.start_node_id, &edge.end_node_id] {
                 if !seen.contains(end.as_str()) && !self.is_enough() {
                     let title = format!("edge `{}` ends at the unknown node `{end}`", edge.edge_id);
@@ -287,7 +252,30 @@ impl Reader<'_> {
         }
     }
 
+    fn not_read(&mut self, what: impl Into<String>, of: &'static str, why: &'static str) {
+        let what = what.into();
+        *self.unread.entry(Unread { what, of, why }).or_default() += 1;
+    }
+
+    /// The actions that are demanded there; the others are counted.
+    fn demands(&mut self, actions: Vec<(Requirement, Demand)>, of: &'static str) -> Vec<Demand> {
+        let mut demands = Vec::new();
+        for (requirement, action) in actions {
+            match requirement {
+                Requirement::Required => demands.push(action),
+                other => {
+                    let what = format!("the {} action {}", other.word(), action.action_type);
+                    self.not_read(what, of, NOT_SENT);
+                }
+            }
+        }
+        demands
+    }
+
     fn layout(&mut self, layout: &FileLayout) {
+        for name in about_driving(&layout.unknown) {
+            self.not_read(name, "layout", NOT_READ);
+        }
         let stations: BTreeSet<&str> = layout
             .stations
             .iter()
@@ -305,12 +293,13 @@ impl Reader<'_> {
     fn node(&mut self, node: &FileNode, station: bool, layout: &str) {
         let id = &node.node_id;
         let all = &node.vehicle_type_node_properties;
-        let Some(properties) = all.iter().find(|one| one.vehicle_type_id == self.vehicle_type) else {
+        let mine = |one: &&file::NodeProperties| one.types().iter().any(|name| name == self.vehicle_type);
+        let Some(properties) = all.iter().find(mine) else {
             self.left_out.push(format!("node {id} is not for this vehicle type"));
             return;
         };
-        if let Some(action) = demanded(&properties.actions) {
-            self.left_out.push(format!("node {id} demands the action {action}"));
+        if properties.load_restriction.as_ref().is_some_and(|load| !load.unloaded) {
+            self.left_out.push(format!("node {id} is not for an empty vehicle"));
             return;
         }
         let Position { x, y } = node.node_position;
@@ -339,6 +328,10 @@ impl Reader<'_> {
             );
             return;
         };
+        for name in about_driving(&node.unknown).chain(about_driving(&properties.unknown)) {
+            self.not_read(name, "node", NOT_READ);
+        }
+        let demands = self.demands(properties.actions(), "node");
         self.nodes.push(Node {
             id: id.clone(),
             map_id,
@@ -347,21 +340,20 @@ impl Reader<'_> {
             theta: properties.theta,
             deviation_xy: None,
             deviation_theta: None,
-            station,
+            // Courses avoid it, so that as few tests as possible take the time of the actions.
+            station: station || !demands.is_empty(),
+            demands,
         });
     }
 
     fn edge(&mut self, edge: &FileEdge) {
         let id = &edge.edge_id;
         let all = &edge.vehicle_type_edge_properties;
-        let Some(properties) = all.iter().find(|one| one.vehicle_type_id == self.vehicle_type) else {
+        let mine = |one: &&EdgeProperties| one.types().iter().any(|name| name == self.vehicle_type);
+        let Some(properties) = all.iter().find(mine) else {
             self.left_out.push(format!("edge {id} is not for this vehicle type"));
             return;
         };
-        if let Some(action) = demanded(&properties.actions) {
-            self.left_out.push(format!("edge {id} demands the action {action}"));
-            return;
-        }
         if properties.load_restriction.as_ref().is_some_and(|load| !load.unloaded) {
             self.left_out.push(format!("edge {id} is not for an empty vehicle"));
             return;
@@ -396,7 +388,8 @@ impl Reader<'_> {
             );
         }
         // LIF has this in degrees in the example everybody copies, and in radians in its text.
-        if let Some(angle) = properties.vehicle_orientation.filter(|angle| !is_angle(*angle)) {
+        let orientations = properties.orientations();
+        if let Some(angle) = orientations.iter().find(|angle| !is_angle(**angle)) {
             let title = format!("vehicleOrientation of edge `{id}` is {angle}");
             self.complain(
                 "edgeId",
@@ -406,27 +399,48 @@ impl Reader<'_> {
                 "angles are in radians",
             );
         }
+        self.count_unread(edge, properties);
+        if orientations.len() > 1 {
+            self.not_read("every orientation but the first", "edge", ONE_WORD);
+        }
+        let demands = self.demands(properties.actions(), "edge");
+        let line = properties.physical_line_guided_property.as_ref();
         self.edges.push(Edge {
             id: id.clone(),
             start: edge.start_node_id.clone(),
             end: edge.end_node_id.clone(),
             max_speed: properties.max_speed,
             max_rotation_speed: properties.max_rotation_speed,
-            orientation: properties.vehicle_orientation,
+            orientation: orientations.first().copied(),
             orientation_type: properties.orientation_type.clone(),
-            rotation_allowed: properties.rotation_allowed,
+            rotation_allowed: properties.rotation_allowed(),
             max_height: properties.max_height,
             min_height: properties.min_height,
-            direction: None,
-            trajectory: properties.trajectory.clone(),
+            direction: line.and_then(|line| line.direction.clone()),
+            trajectory: properties.trajectory(),
+            demands,
+            told: Vec::new(),
         });
     }
-}
 
-/// The first action that a vehicle has to do there.
-fn demanded(actions: &[Action]) -> Option<&str> {
-    let demanded = |action: &&Action| action.requirement_type.as_deref() == Some("REQUIRED");
-    actions.iter().find(demanded).map(|action| action.action_type.as_str())
+    /// Counts what an edge says and nobody reads, or no order can say.
+    fn count_unread(&mut self, edge: &FileEdge, properties: &EdgeProperties) {
+        let line = properties.physical_line_guided_property.as_ref();
+        let of_line = line.into_iter().flat_map(|line| about_driving(&line.unknown));
+        let of_edge = about_driving(&edge.unknown).chain(about_driving(&properties.unknown));
+        for name in of_edge.chain(of_line) {
+            self.not_read(name, "edge", NOT_READ);
+        }
+        for (name, rotation) in [
+            ("rotationAtStartNodeAllowed", &properties.rotation_at_start_node_allowed),
+            ("rotationAtEndNodeAllowed", &properties.rotation_at_end_node_allowed),
+        ] {
+            // Both directions are what goes without saying.
+            if rotation.as_deref().is_some_and(|allowed| allowed != "BOTH") {
+                self.not_read(name, "edge", NO_WORD);
+            }
+        }
+    }
 }
 
 /// Whether it is an angle; a little beyond π is rounding.
