@@ -102,7 +102,7 @@ pub fn markdown(result: &AuditResult) -> String {
                 mistake.worst.verdict.word().to_owned(),
                 named(vehicle, side),
                 mistake.requirements.join(", "),
-                mistake.worst.text.chars().take(300).collect(),
+                with_what_follows(&mistake),
                 mistake.count.to_string(),
                 place(mistake.worst, result),
             ];
@@ -111,6 +111,17 @@ pub fn markdown(result: &AuditResult) -> String {
         }
     }
     text
+}
+
+/// A mistake in a few words, and the requirements of what follows from it.
+fn with_what_follows(mistake: &Mistake<'_>) -> String {
+    let text: String = mistake.worst.text.chars().take(300).collect();
+    let mut follows: Vec<&str> = mistake.follows.iter().map(|one| one.requirement.as_str()).collect();
+    follows.dedup();
+    match follows.as_slice() {
+        [] => text,
+        all => format!("{text} (from it follow: {})", all.join(", ")),
+    }
 }
 
 /// What is broken, as issues in the recordings.
@@ -193,14 +204,20 @@ fn cases(result: &AuditResult) -> Vec<Plain> {
     for vehicle in &result.vehicles {
         for side in &vehicle.sides {
             let suite = named(vehicle, side);
+            let mistakes = side.mistakes();
             all.extend(side.requirements.iter().map(|decided| {
                 let findings = side.findings.iter().filter(|finding| finding.requirement == decided.id);
                 let texts: Vec<String> = findings.map(|finding| sentence(finding, result)).collect();
+                let cause = cause_of(&decided.id, &mistakes);
                 Plain {
                     suite: suite.clone(),
                     name: decided.id.clone(),
-                    verdict: Some(decided.verdict),
-                    text: texts.join("\n"),
+                    // A build server counts mistakes, so what follows from one is shown beside it and counts for none.
+                    verdict: cause.is_none().then_some(decided.verdict),
+                    text: match cause {
+                        Some(cause) => format!("follows from {cause}: {}", texts.join("\n")),
+                        None => texts.join("\n"),
+                    },
                 }
             }));
         }
@@ -222,6 +239,21 @@ fn cases(result: &AuditResult) -> Vec<Plain> {
         });
     }
     all
+}
+
+/// The requirement from which all follows that was found of this one; none where something else was found of it.
+fn cause_of<'m>(id: &str, mistakes: &[Mistake<'m>]) -> Option<&'m str> {
+    let is_own = |mistake: &Mistake<'_>| mistake.requirements.first() == Some(&id);
+    let names = |mistake: &&Mistake<'_>| {
+        mistake.requirements.contains(&id) || mistake.follows.iter().any(|finding| finding.requirement == id)
+    };
+    let mut mistakes = mistakes.iter();
+    if mistakes.clone().any(is_own) {
+        return None;
+    }
+    mistakes
+        .find(names)
+        .and_then(|mistake| mistake.requirements.first().copied())
 }
 
 fn sentence(finding: &FindingResult, result: &AuditResult) -> String {
@@ -587,7 +619,19 @@ mod tests {
         let document = roxmltree::Document::parse(&junit).expect("XML");
         let failures = document.descendants().filter(|node| node.has_tag_name("failure"));
         let types: Vec<&str> = failures.filter_map(|node| node.attribute("type")).collect();
-        assert!(types.contains(&"STATE-12") && types.contains(&"MODE-01"), "{types:?}");
+        // A failure for each mistake, by the requirement it is shown as.
+        let sides = result.vehicles.iter().flat_map(|vehicle| &vehicle.sides);
+        let mistakes = sides
+            .flat_map(SideResult::mistakes)
+            .filter(|mistake| mistake.worst.verdict == Verdict::Fail);
+        let mistakes: Vec<Vec<String>> = mistakes
+            .map(|mistake| mistake.requirements.iter().map(ToString::to_string).collect())
+            .collect();
+        let shown: std::collections::BTreeSet<&str> = mistakes.iter().map(|all| all[0].as_str()).collect();
+        assert_eq!(types.iter().copied().collect::<std::collections::BTreeSet<_>>(), shown);
+        for id in ["STATE-12", "MODE-01"] {
+            assert!(mistakes.iter().flatten().any(|known| known == id), "{mistakes:?}");
+        }
         let value: serde_json::Value = serde_json::from_str(&read("result.json")).expect("JSON");
         assert!(
             value["vehicles"][0]["timeLine"]["order"]

@@ -430,6 +430,7 @@ impl<'r> Audit<'r> {
             vehicles,
         };
         self.misnamed.tell(&mut result, self.rules, &self.options);
+        result.trace(&self.rules.catalogue);
         result.conclude();
         result
     }

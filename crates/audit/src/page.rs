@@ -269,6 +269,16 @@ fn of_mistake(mistake: &Mistake<'_>, result: &AuditResult) -> String {
         worst.first
     );
     let _ = writeln!(text, "            {}", short(&line(&worst.text), 400));
+    for finding in &mistake.follows {
+        let place = placed(result, finding.recording, finding.line, finding.message);
+        let _ = writeln!(
+            text,
+            "            follows from it: {} {}, {}: {place}",
+            finding.requirement,
+            finding.monitor,
+            times(finding.count)
+        );
+    }
     text
 }
 

@@ -5,12 +5,12 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::finding_group;
 use super::time_line::TimeLine;
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_capture::{Counted, SourcePosition};
 use tck_journal::event::ShardRecord;
-use tck_pack::Role;
+use tck_pack::{Catalogue, Role};
+use tck_report::cause::{Evidence, Sighting, Tie, causes};
 use tck_report::manifest::digest;
 use tck_result::MergedParts;
 
@@ -191,6 +191,9 @@ pub struct SideResult {
     pub judged: usize,
     /// Fails and warnings, the worst first.
     pub findings: Vec<FindingResult>,
+    /// The mistakes behind them, in the same order: one for each finding that follows from no other one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub causes: Vec<CauseResult>,
     /// What is worth knowing, and decides nothing.
     pub information: Vec<FindingResult>,
     /// The requirements that were decided.
@@ -290,6 +293,21 @@ pub struct HintResult {
     pub first: Whereabouts,
 }
 
+/// A finding that follows from no other one, and those that follow from it, by their numbers among the findings of the side,
+/// counted from 0.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct CauseResult {
+    /// The finding.
+    pub finding: usize,
+    /// The same thing, found as a breach of another requirement or by another monitor.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub same: Vec<usize>,
+    /// What rests on what it breaks.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub follows: Vec<usize>,
+}
+
 /// One mistake: every requirement that it breaks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mistake<'r> {
@@ -299,6 +317,8 @@ pub struct Mistake<'r> {
     pub worst: &'r FindingResult,
     /// How often.
     pub count: u64,
+    /// What follows from it.
+    pub follows: Vec<&'r FindingResult>,
 }
 
 /// A requirement that was decided.
@@ -340,7 +360,8 @@ impl SideResult {
         let is_finding = |finding: &FindingResult| matches!(finding.verdict, Verdict::Fail | Verdict::Warning);
         let (mut findings, information): (Vec<_>, Vec<_>) = found.into_iter().partition(is_finding);
         findings.sort_by(|one, other| {
-            let key = |finding: &FindingResult| (std::cmp::Reverse(finding.verdict), finding.message);
+            let often = std::cmp::Reverse;
+            let key = |finding: &FindingResult| (often(finding.verdict), finding.message, often(finding.count));
             key(one).cmp(&key(other))
         });
         let mut verdict: Accumulated = findings.iter().map(|finding| finding.verdict).collect();
@@ -370,6 +391,7 @@ impl SideResult {
             verdict: verdict.get(),
             messages,
             judged,
+            causes: causes_of(&findings, |_| Vec::new()),
             findings,
             information,
             requirements: requirements.collect(),
@@ -381,31 +403,46 @@ impl SideResult {
         }
     }
 
-    /// What is wrong, mistake by mistake: what is found at one place of one message is one, whatever it breaks.
+    /// What is wrong, mistake by mistake: what is found of one thing is one, whatever it breaks.
     #[must_use]
     pub fn mistakes(&self) -> Vec<Mistake<'_>> {
-        let mut all: Vec<Mistake<'_>> = Vec::new();
-        for finding in &self.findings {
-            let about = |finding: &FindingResult| (finding.message, finding_group::place(&finding.text).to_owned());
-            match all.iter_mut().find(|known| about(known.worst) == about(finding)) {
-                Some(known) => {
-                    let is_more = finding.verdict == known.worst.verdict && finding.text.len() > known.worst.text.len();
-                    if is_more {
-                        known.worst = finding;
-                    }
-                    if !known.requirements.contains(&finding.requirement.as_str()) {
-                        known.requirements.push(&finding.requirement);
-                    }
-                    known.count = known.count.max(finding.count);
+        // A result of an earlier version has none.
+        let causes = match self.causes.as_slice() {
+            [] => &causes_of(&self.findings, |_| Vec::new()),
+            causes => causes,
+        };
+        let all = causes.iter().filter_map(|cause| {
+            let first = self.findings.get(cause.finding)?;
+            let at = |numbers: &[usize]| -> Vec<&FindingResult> {
+                numbers.iter().filter_map(|number| self.findings.get(*number)).collect()
+            };
+            let mut mistake = Mistake {
+                requirements: vec![&first.requirement],
+                worst: first,
+                count: first.count,
+                follows: at(&cause.follows),
+            };
+            for finding in at(&cause.same) {
+                // The one that says most.
+                let known = mistake.worst;
+                if finding.verdict == known.verdict && finding.text.len() > known.text.len() {
+                    mistake.worst = finding;
                 }
-                None => all.push(Mistake {
-                    requirements: vec![&finding.requirement],
-                    worst: finding,
-                    count: finding.count,
-                }),
+                if !mistake.requirements.contains(&finding.requirement.as_str()) {
+                    mistake.requirements.push(&finding.requirement);
+                }
             }
-        }
-        all
+            Some(mistake)
+        });
+        all.collect()
+    }
+
+    /// Finds out what follows from what, by what requirements rest on.
+    fn trace(&mut self, catalogue: &Catalogue) {
+        self.causes = causes_of(&self.findings, |id| {
+            let known = catalogue.get(id).into_iter().flat_map(|known| &known.rests_on);
+            known.map(ToString::to_string).collect()
+        });
     }
 
     /// Takes back that something is kept where too little was seen; what is wrong is wrong.
@@ -420,7 +457,50 @@ impl SideResult {
     }
 }
 
+/// The findings of a side that follow from no other one, with those that do.
+fn causes_of(findings: &[FindingResult], rests_on: impl Fn(&str) -> Vec<String>) -> Vec<CauseResult> {
+    let below: Vec<Vec<String>> = findings.iter().map(|finding| rests_on(&finding.requirement)).collect();
+    let evidence: Vec<Evidence<'_>> = findings
+        .iter()
+        .zip(&below)
+        .map(|(finding, below)| Evidence {
+            requirement: &finding.requirement,
+            verdict: Some(finding.verdict),
+            count: finding.count,
+            sightings: BTreeSet::from([Sighting {
+                by: finding.monitor.clone(),
+                message: Some(finding.message),
+                text: finding.text.clone(),
+            }]),
+            first: Some(finding.message),
+            rests_on: below.iter().map(String::as_str).collect(),
+            ..Evidence::default()
+        })
+        .collect();
+    let found = causes(&evidence);
+    let own = found.iter().enumerate().filter(|(_, cause)| cause.is_none());
+    own.map(|(at, _)| {
+        let of = |tie: Tie| {
+            let all = found.iter().enumerate();
+            let tied = all.filter(|(_, cause)| cause.is_some_and(|cause| cause.finding == at && cause.tie == tie));
+            tied.map(|(number, _)| number).collect()
+        };
+        CauseResult {
+            finding: at,
+            same: of(Tie::Same),
+            follows: of(Tie::Rests),
+        }
+    })
+    .collect()
+}
+
 impl AuditResult {
+    /// Finds out of each side what follows from what.
+    pub(super) fn trace(&mut self, catalogue: &Catalogue) {
+        let sides = self.vehicles.iter_mut().flat_map(|vehicle| &mut vehicle.sides);
+        sides.for_each(|side| side.trace(catalogue));
+    }
+
     /// Takes in what was found of a vehicle beside the audit. Where the audit has found the same, that counts once more.
     pub fn add(&mut self, (manufacturer, serial_number): (&str, &str), finding: FindingResult) {
         let mut vehicles = self.vehicles.iter_mut().rev();
@@ -517,8 +597,28 @@ impl SideResult {
             None => {
                 let at = self.findings.partition_point(|known| known.verdict >= verdict);
                 self.findings.insert(at, finding);
+                self.own_cause(at);
             }
         }
+    }
+}
+
+impl SideResult {
+    /// A finding has come to stand at this number, and follows from nothing.
+    fn own_cause(&mut self, at: usize) {
+        for cause in &mut self.causes {
+            let moved = std::iter::once(&mut cause.finding)
+                .chain(&mut cause.same)
+                .chain(&mut cause.follows);
+            moved.filter(|number| **number >= at).for_each(|number| *number += 1);
+        }
+        let place = self.causes.partition_point(|cause| cause.finding < at);
+        let own = CauseResult {
+            finding: at,
+            same: Vec::new(),
+            follows: Vec::new(),
+        };
+        self.causes.insert(place, own);
     }
 }
 

@@ -115,6 +115,7 @@ pub static REGISTRY: &[Check] = &[
     trajectory::TRAJECTORY_ENDS,
     trajectory::PLANNED_PATH,
     state::battery::LEVELS,
+    state::battery::PERCENT,
     state::loads::LOADS,
     state::joint_loads::JOINT_LOADS,
     visualization::RATE,

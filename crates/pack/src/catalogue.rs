@@ -216,6 +216,9 @@ pub struct Requirement {
     /// What the other reading would be.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub otherwise: Option<String>,
+    /// The requirements that have to be kept for it to be decided: where one of them is broken, a breach of this one follows.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub rests_on: Vec<RequirementId>,
     /// Where it is tracked, for a requirement of somebody's own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub link: Option<String>,
@@ -288,6 +291,16 @@ impl Catalogue {
                 );
             }
             catalogue.requirements.push(requirement);
+        }
+        for requirement in &catalogue.requirements {
+            let unknown = requirement
+                .rests_on
+                .iter()
+                .filter(|id| catalogue.get(id.as_str()).is_none());
+            problems.extend(unknown.map(|id| {
+                let title = format!("{} rests on {id}, which there is not", requirement.id);
+                Diagnostic::whole("unknown-requirement", title)
+            }));
         }
         if catalogue.requirements.is_empty() && problems.is_empty() {
             problems.push(

@@ -19,7 +19,7 @@ use junit_report::{Duration, OffsetDateTime, ReportBuilder, TestCase, TestResult
 use askama::filters::Escaper as _;
 
 use super::clean;
-use super::findings::{Finding, PROGRAM, findings};
+use super::findings::{Finding, PROGRAM, findings, is_told_by_tests};
 use super::html::Escape;
 use super::repeated;
 use super::sources::Sources;
@@ -80,7 +80,7 @@ pub fn render(result: &RunResult, flavour: Flavour<'_>) -> Result<String, JunitE
         let cases = result
             .monitors
             .iter()
-            .map(|monitor| monitor_case(monitor, how))
+            .map(|monitor| monitor_case(monitor, is_told_by_tests(monitor, result), how))
             .collect();
         report.add_testsuite(suite(result, "monitors", cases));
     }
@@ -462,7 +462,8 @@ fn finding(decision: &Decision) -> String {
     text
 }
 
-fn monitor_case(monitor: &MonitorResult, how: Inconclusive) -> TestCase {
+/// `told` says that failed tests show all that it has failed for: a mistake is one failure.
+fn monitor_case(monitor: &MonitorResult, told: bool, how: Inconclusive) -> TestCase {
     let mut findings: Vec<_> = monitor.findings.iter().collect();
     findings.sort_by_key(|finding| std::cmp::Reverse(finding.verdict));
     let kind = findings.first().map_or("", |finding| finding.requirement.as_str());
@@ -487,12 +488,17 @@ fn monitor_case(monitor: &MonitorResult, how: Inconclusive) -> TestCase {
         })
         .collect::<Vec<_>>()
         .join("\n");
+    let (verdict, message) = if told {
+        (None, format!("the tests that failed show it: {kind}: {message}"))
+    } else {
+        (monitor.verdict, message.to_owned())
+    };
     Case {
         name: &monitor.id,
         class: "monitors",
         seconds: 0.0,
-        outcome: outcome(monitor.verdict, kind, message, &lines, how),
-        out: (monitor.verdict == Some(Verdict::Warning)).then_some(lines),
+        outcome: outcome(verdict, kind, &message, &lines, how),
+        out: (verdict == Some(Verdict::Warning)).then_some(lines),
     }
     .build()
 }
@@ -512,6 +518,8 @@ fn requirement_case(
     // What applies and was not decided is no pass, and what no test can decide is nobody's fault.
     let verdict = match statement::gap(requirement) {
         Some(Gap::NotDecided) => Some(Verdict::Inconclusive),
+        // A mistake is one failure, and what follows from it none.
+        _ if finding.is_some_and(|finding| finding.follows.is_some()) => None,
         _ => requirement.verdict,
     };
     let gap = requirement.not_decided.as_ref().map(ToString::to_string);

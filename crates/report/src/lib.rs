@@ -8,6 +8,7 @@
 
 pub mod advice;
 pub mod attestation;
+pub mod cause;
 pub mod certificate;
 pub mod clean;
 pub mod compare;
