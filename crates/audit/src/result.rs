@@ -407,9 +407,12 @@ impl SideResult {
     #[must_use]
     pub fn mistakes(&self) -> Vec<Mistake<'_>> {
         // A result of an earlier version has none.
-        let causes = match self.causes.as_slice() {
-            [] => &causes_of(&self.findings, |_| Vec::new()),
-            causes => causes,
+        let fresh;
+        let causes: &[CauseResult] = if self.causes.is_empty() {
+            fresh = causes_of(&self.findings, |_| Vec::new());
+            &fresh
+        } else {
+            &self.causes
         };
         let all = causes.iter().filter_map(|cause| {
             let first = self.findings.get(cause.finding)?;

@@ -233,7 +233,7 @@ impl Exploration {
                 ));
             }
             self.converse(&mut known, stage, note)?;
-            if !left.is_empty() && known.undecided.1.as_deref() != Some(SAYS_NOTHING) {
+            if self.budget.is_some() && known.undecided.1.as_deref() != Some(SAYS_NOTHING) {
                 self.probe(&mut known, &mut left, (&mut *stage, SHRINKING_BEGINS))?;
             }
         }

@@ -73,7 +73,8 @@ pub fn causes(all: &[Evidence<'_>]) -> Vec<Option<Cause>> {
         .iter()
         .enumerate()
         .map(|(at, finding)| {
-            let same = |other: &usize| is_same(finding, &all[*other]);
+            // What rests on this one is no cause of it.
+            let same = |other: &usize| is_same(finding, &all[*other]) && !rests(&all[*other], finding);
             let below = |other: &usize| *other != at && rests(finding, &all[*other]);
             let tied = |finding, tie| Cause { finding, tie };
             let same = (0..at).find(same).map(|finding| tied(finding, Tie::Same));
@@ -181,7 +182,7 @@ mod tests {
         let in_tests = |requirement, tests: &[usize], rests_on: &[&'static str]| Evidence {
             episodes: tests.iter().copied().collect(),
             rests_on: rests_on.to_vec(),
-            ..seen(requirement, 1, &[(requirement, 9, "wrong")])
+            ..seen(requirement, 1, &[(requirement, 9, requirement)])
         };
         let driven = in_tests("ORD-06", &[1, 2], &["ORD-04"]);
         let ends = in_tests("NODE-05", &[1], &["ORD-06"]);
@@ -215,6 +216,15 @@ mod tests {
             },
         );
         assert_eq!(numbers(&[early, late]), [None, None]);
+        // Seen in the same words, too: what is rested on stays the cause.
+        let words = |requirement, rests_on: &[&'static str]| Evidence {
+            rests_on: rests_on.to_vec(),
+            ..seen(requirement, 1, &[("a/b", 9, "wrong")])
+        };
+        assert_eq!(
+            numbers(&[words("ORD-06", &["ORD-04"]), words("ORD-04", &[])]),
+            [Some(1), None]
+        );
     }
 
     #[test]

@@ -306,10 +306,10 @@ mod tests {
         let expected = [
             ("A-1", None),
             ("A-2", Some("A-1")),
+            ("A-3", Some("A-1")),
             ("A-4", Some("A-1")),
             ("B-1", None),
             ("B-2", None),
-            ("A-3", None),
         ];
         assert_eq!(rows, expected);
         let one = behind_their_causes(
