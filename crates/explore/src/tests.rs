@@ -224,20 +224,41 @@ const DIMENSIONS: [(&str, &[&str]); 9] = [
     ),
 ];
 
+/// The same for a master control.
+const DIMENSIONS_OF_COMMANDS: [(&str, &[&str]); 4] = [
+    (
+        "limits alone and in pairs",
+        &["vehicle-few-nodes", "vehicle-short-names", "vehicle-two-limits"],
+    ),
+    (
+        "limits with the farthest destination",
+        &["vehicle-few-nodes-elsewhere", "vehicle-interval-elsewhere"],
+    ),
+    (
+        "beside an older one",
+        &["second-transport", "second-paused", "reroute-twice"],
+    ),
+    ("after a cut", &["cut-twice", "back-with-order", "own-while-away"]),
+];
+
 #[test]
 fn every_dimension_of_oddness_is_drawn() {
     let library = tck_testing::library();
-    let grammar = grammar(library, library.rules.packs.latest(), Role::Agv);
-    let exploration = exploration(grammar.clone(), 1, 400);
-    let drawn = exploration.drawn(&grammar, &mut Coverage::default());
-    let said: BTreeSet<&str> = drawn
-        .iter()
-        .flat_map(|(chain, _)| chain.stimuli())
-        .map(|name| family(name))
-        .collect();
-    for (dimension, stimuli) in DIMENSIONS {
-        for name in stimuli {
-            assert!(said.contains(name), "{dimension}: {name} is never drawn");
+    let sides: [(Role, &[(&str, &[&str])]); 2] =
+        [(Role::Agv, &DIMENSIONS), (Role::MasterControl, &DIMENSIONS_OF_COMMANDS)];
+    for (role, dimensions) in sides {
+        let grammar = grammar(library, library.rules.packs.latest(), role);
+        let exploration = exploration(grammar.clone(), 1, 400);
+        let drawn = exploration.drawn(&grammar, &mut Coverage::default());
+        let said: BTreeSet<&str> = drawn
+            .iter()
+            .flat_map(|(chain, _)| chain.stimuli())
+            .map(|name| family(name))
+            .collect();
+        for (dimension, stimuli) in dimensions {
+            for name in *stimuli {
+                assert!(said.contains(name), "{dimension}: {name} is never drawn");
+            }
         }
     }
 }
