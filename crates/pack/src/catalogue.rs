@@ -416,6 +416,26 @@ mod tests {
     }
 
     #[test]
+    fn nothing_rests_on_what_rests_on_it() {
+        let catalogue = catalogue();
+        let mut resting = 0;
+        for requirement in catalogue.all() {
+            resting += usize::from(!requirement.rests_on.is_empty());
+            let (mut open, mut seen) = (vec![requirement], BTreeSet::new());
+            while let Some(next) = open.pop() {
+                for id in &next.rests_on {
+                    let below = catalogue.get(id.as_str()).unwrap();
+                    assert_ne!(below.id, requirement.id, "by {}", next.id);
+                    if seen.insert(below.id.clone()) {
+                        open.push(below);
+                    }
+                }
+            }
+        }
+        assert!(resting > 30, "{resting}");
+    }
+
+    #[test]
     fn a_reason_belongs_to_a_ruling() {
         let text = "group: A\nchapter: x\nposition: 1\nrequirements:\n  - id: A-1\n    text: x\n    role: agv\n    \
                     decided: active\n    in: { \"2.1\": { section: \"4\", mood: shall } }\n    stimulus: x\n    \

@@ -38,11 +38,13 @@ pub struct Evidence<'a> {
     pub count: u64,
     /// What is known of that.
     pub sightings: BTreeSet<Sighting>,
-    /// The tests in which it was seen, by number; a recording is one.
+    /// The tests in which it is known to have been seen, by number; a recording is one.
     pub episodes: BTreeSet<usize>,
+    /// The test from which on it was seen more often than is known.
+    pub more_from: Option<usize>,
     /// The first message that shows it, where messages alone say what came first.
     pub first: Option<u64>,
-    /// Whether nothing shows that the requirement was kept at any time.
+    /// Whether tests have decided the requirement, and it was kept in none.
     pub never_kept: bool,
     /// The requirements that have to be kept for this one to be decided.
     pub rests_on: Vec<&'a str>,
@@ -110,7 +112,8 @@ fn is_same(finding: &Evidence<'_>, other: &Evidence<'_>) -> bool {
 
 /// Whether the requirement of a finding rests on that of the other one, and that was broken wherever the finding was seen.
 fn rests(finding: &Evidence<'_>, other: &Evidence<'_>) -> bool {
-    let is_there = || other.never_kept || finding.episodes.is_subset(&other.episodes);
+    let may_be_in = |test: &usize| other.episodes.contains(test) || other.more_from.is_some_and(|from| from <= *test);
+    let is_there = || other.never_kept || finding.episodes.iter().all(may_be_in);
     let is_later = finding.first.zip(other.first).is_none_or(|(own, first)| first <= own);
     finding.rests_on.contains(&other.requirement) && other.verdict >= finding.verdict && is_later && is_there()
 }
@@ -197,8 +200,13 @@ mod tests {
             never_kept: true,
             ..taken.clone()
         };
+        let often = Evidence {
+            more_from: Some(3),
+            ..taken.clone()
+        };
         assert_eq!(numbers(&[elsewhere.clone(), taken.clone()]), [None, None]);
-        assert_eq!(numbers(&[elsewhere, never_kept]), [Some(1), None]);
+        assert_eq!(numbers(&[elsewhere.clone(), never_kept]), [Some(1), None]);
+        assert_eq!(numbers(&[elsewhere, often]), [Some(1), None]);
         // A remark is the cause of no failure, and what comes later of nothing before it.
         let remark = Evidence {
             verdict: Some(Verdict::Warning),

@@ -44,6 +44,8 @@ pub struct Finding<'a> {
     sightings: BTreeSet<Sighting>,
     /// The tests in which it was seen, by number.
     episodes: BTreeSet<usize>,
+    /// The test from which on it was seen more often than is known.
+    more_from: Option<usize>,
 }
 
 /// Stands for the time in which no test ran.
@@ -93,9 +95,12 @@ pub fn findings<'a>(result: &'a RunResult, sources: &'a Sources) -> Vec<Finding<
                 message: first,
                 text: found.message.clone(),
             });
-            finding
-                .episodes
-                .extend(found.first.iter().map(|seq| test_at(result, *seq)));
+            let tests = found.first.iter().map(|seq| test_at(result, *seq));
+            finding.episodes.extend(tests.clone());
+            // Of what happened often, only the first places are kept.
+            if found.count > found.first.len() as u64 {
+                finding.more_from = finding.more_from.into_iter().chain(tests.last()).min();
+            }
             if !finding.monitors.contains(&monitor.id.as_str()) {
                 finding.monitors.push(&monitor.id);
             }
@@ -120,6 +125,7 @@ pub fn findings<'a>(result: &'a RunResult, sources: &'a Sources) -> Vec<Finding<
             follows: None,
             sightings: BTreeSet::new(),
             episodes: BTreeSet::new(),
+            more_from: None,
         });
     }
     all.sort_by_key(|finding| std::cmp::Reverse((finding.verdict, finding.tests.len() + finding.monitors.len())));
@@ -164,7 +170,8 @@ fn behind_their_causes<'a>(mut all: Vec<Finding<'a>>, kept: &BTreeSet<&str>, sou
             sightings: finding.sightings.clone(),
             episodes: finding.episodes.clone(),
             first: None,
-            never_kept: !kept.contains(finding.requirement),
+            more_from: finding.more_from,
+            never_kept: !finding.tests.is_empty() && !kept.contains(finding.requirement),
             rests_on: sources.rests_on(finding.requirement),
         })
         .collect();
@@ -243,6 +250,7 @@ fn row<'a, 'r>(all: &'r mut Vec<Finding<'a>>, id: &'a str, sources: &'a Sources)
             follows: None,
             sightings: BTreeSet::new(),
             episodes: BTreeSet::new(),
+            more_from: None,
         });
         all.len() - 1
     });
@@ -268,6 +276,7 @@ mod tests {
             follows: None,
             sightings: BTreeSet::new(),
             episodes: BTreeSet::new(),
+            more_from: None,
         }
     }
 
