@@ -95,12 +95,13 @@ pub fn findings<'a>(result: &'a RunResult, sources: &'a Sources) -> Vec<Finding<
                 message: first,
                 text: found.message.clone(),
             });
-            let tests = found.first.iter().map(|seq| test_at(result, *seq));
-            finding.episodes.extend(tests.clone());
+            finding
+                .episodes
+                .extend(found.first.iter().map(|seq| test_at(result, *seq)));
             // Of what happened often, only the first places are kept.
-            if found.count > found.first.len() as u64 {
-                finding.more_from = finding.more_from.into_iter().chain(tests.last()).min();
-            }
+            let last = found.first.last().filter(|_| found.count > found.first.len() as u64);
+            let more_from = last.map(|seq| test_at(result, *seq));
+            finding.more_from = finding.more_from.into_iter().chain(more_from).min();
             if !finding.monitors.contains(&monitor.id.as_str()) {
                 finding.monitors.push(&monitor.id);
             }
