@@ -10,6 +10,7 @@
 mod arrived;
 pub mod baseline;
 pub mod bundle;
+mod cases;
 mod continuity;
 mod conversation;
 mod dedup;
@@ -20,6 +21,7 @@ mod hint;
 pub mod join;
 mod message_check;
 mod misnamed;
+pub mod mistakes;
 mod mqtt_sessions;
 mod new_findings;
 mod outcome;

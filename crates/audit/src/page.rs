@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::result::{AuditResult, Mistake, SideResult, Stretch, VehicleResult, Whereabouts, Whole, WholeDecided};
+use super::mistakes::Mistake;
+use super::result::{AuditResult, SideResult, Stretch, VehicleResult, Whereabouts, Whole, WholeDecided};
 use tck_base::verdict::Verdict;
 use tck_report::clean::{line, short};
 use tck_report::statement::many;

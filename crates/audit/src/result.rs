@@ -9,8 +9,7 @@ use super::time_line::TimeLine;
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_capture::{Counted, SourcePosition};
 use tck_journal::event::ShardRecord;
-use tck_pack::{Catalogue, Role};
-use tck_report::cause::{Evidence, Sighting, Tie, causes};
+use tck_pack::Role;
 use tck_report::manifest::digest;
 use tck_result::MergedParts;
 
@@ -191,7 +190,7 @@ pub struct SideResult {
     pub judged: usize,
     /// Fails and warnings, the worst first.
     pub findings: Vec<FindingResult>,
-    /// The mistakes behind them, in the same order: one for each finding that follows from no other one.
+    /// The mistakes behind them, in the same order: one for each finding that follows from no other one. Of an audit that is over.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub causes: Vec<CauseResult>,
     /// What is worth knowing, and decides nothing.
@@ -308,19 +307,6 @@ pub struct CauseResult {
     pub follows: Vec<usize>,
 }
 
-/// One mistake: every requirement that it breaks.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Mistake<'r> {
-    /// The requirements.
-    pub requirements: Vec<&'r str>,
-    /// The worst of what was found of it.
-    pub worst: &'r FindingResult,
-    /// How often.
-    pub count: u64,
-    /// What follows from it.
-    pub follows: Vec<&'r FindingResult>,
-}
-
 /// A requirement that was decided.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
@@ -391,7 +377,7 @@ impl SideResult {
             verdict: verdict.get(),
             messages,
             judged,
-            causes: causes_of(&findings, |_| Vec::new()),
+            causes: Vec::new(),
             findings,
             information,
             requirements: requirements.collect(),
@@ -401,51 +387,6 @@ impl SideResult {
             not_compared: 0,
             stretches: Vec::new(),
         }
-    }
-
-    /// What is wrong, mistake by mistake: what is found of one thing is one, whatever it breaks.
-    #[must_use]
-    pub fn mistakes(&self) -> Vec<Mistake<'_>> {
-        // A result of an earlier version has none.
-        let fresh;
-        let causes: &[CauseResult] = if self.causes.is_empty() {
-            fresh = causes_of(&self.findings, |_| Vec::new());
-            &fresh
-        } else {
-            &self.causes
-        };
-        let all = causes.iter().filter_map(|cause| {
-            let first = self.findings.get(cause.finding)?;
-            let at = |numbers: &[usize]| -> Vec<&FindingResult> {
-                numbers.iter().filter_map(|number| self.findings.get(*number)).collect()
-            };
-            let mut mistake = Mistake {
-                requirements: vec![&first.requirement],
-                worst: first,
-                count: first.count,
-                follows: at(&cause.follows),
-            };
-            for finding in at(&cause.same) {
-                // The one that says most.
-                let known = mistake.worst;
-                if finding.verdict == known.verdict && finding.text.len() > known.text.len() {
-                    mistake.worst = finding;
-                }
-                if !mistake.requirements.contains(&finding.requirement.as_str()) {
-                    mistake.requirements.push(&finding.requirement);
-                }
-            }
-            Some(mistake)
-        });
-        all.collect()
-    }
-
-    /// Finds out what follows from what, by what requirements rest on.
-    fn trace(&mut self, catalogue: &Catalogue) {
-        self.causes = causes_of(&self.findings, |id| {
-            let known = catalogue.get(id).into_iter().flat_map(|known| &known.rests_on);
-            known.map(ToString::to_string).collect()
-        });
     }
 
     /// Takes back that something is kept where too little was seen; what is wrong is wrong.
@@ -460,50 +401,7 @@ impl SideResult {
     }
 }
 
-/// The findings of a side that follow from no other one, with those that do.
-fn causes_of(findings: &[FindingResult], rests_on: impl Fn(&str) -> Vec<String>) -> Vec<CauseResult> {
-    let below: Vec<Vec<String>> = findings.iter().map(|finding| rests_on(&finding.requirement)).collect();
-    let evidence: Vec<Evidence<'_>> = findings
-        .iter()
-        .zip(&below)
-        .map(|(finding, below)| Evidence {
-            requirement: &finding.requirement,
-            verdict: Some(finding.verdict),
-            count: finding.count,
-            sightings: BTreeSet::from([Sighting {
-                by: finding.monitor.clone(),
-                message: Some(finding.message),
-                text: finding.text.clone(),
-            }]),
-            first: Some(finding.message),
-            rests_on: below.iter().map(String::as_str).collect(),
-            ..Evidence::default()
-        })
-        .collect();
-    let found = causes(&evidence);
-    let own = found.iter().enumerate().filter(|(_, cause)| cause.is_none());
-    own.map(|(at, _)| {
-        let of = |tie: Tie| {
-            let all = found.iter().enumerate();
-            let tied = all.filter(|(_, cause)| cause.is_some_and(|cause| cause.finding == at && cause.tie == tie));
-            tied.map(|(number, _)| number).collect()
-        };
-        CauseResult {
-            finding: at,
-            same: of(Tie::Same),
-            follows: of(Tie::Rests),
-        }
-    })
-    .collect()
-}
-
 impl AuditResult {
-    /// Finds out of each side what follows from what.
-    pub(super) fn trace(&mut self, catalogue: &Catalogue) {
-        let sides = self.vehicles.iter_mut().flat_map(|vehicle| &mut vehicle.sides);
-        sides.for_each(|side| side.trace(catalogue));
-    }
-
     /// Takes in what was found of a vehicle beside the audit. Where the audit has found the same, that counts once more.
     pub fn add(&mut self, (manufacturer, serial_number): (&str, &str), finding: FindingResult) {
         let mut vehicles = self.vehicles.iter_mut().rev();
@@ -607,8 +505,11 @@ impl SideResult {
 }
 
 impl SideResult {
-    /// A finding has come to stand at this number, and follows from nothing.
+    /// A finding has come to stand at this number, and follows from nothing, where it is known already what follows from what.
     fn own_cause(&mut self, at: usize) {
+        if self.causes.is_empty() {
+            return;
+        }
         for cause in &mut self.causes {
             let moved = std::iter::once(&mut cause.finding)
                 .chain(&mut cause.same)
