@@ -498,7 +498,7 @@ fn monitor_case(monitor: &MonitorResult, told: bool, how: Inconclusive) -> TestC
         class: "monitors",
         seconds: 0.0,
         outcome: outcome(verdict, kind, &message, &lines, how),
-        out: (verdict == Some(Verdict::Warning)).then_some(lines),
+        out: (told || verdict == Some(Verdict::Warning)).then_some(lines),
     }
     .build()
 }
