@@ -426,6 +426,10 @@ fn about_requirement(requirement: &Requirement, library: &Library, pack: &Pack) 
     if let Some(otherwise) = &requirement.otherwise {
         let _ = writeln!(text, "or else        {otherwise}");
     }
+    if !requirement.rests_on.is_empty() {
+        let ids: Vec<&str> = requirement.rests_on.iter().map(|id| id.as_str()).collect();
+        let _ = writeln!(text, "rests on       {}", ids.join(", "));
+    }
     let _ = writeln!(text, "decided        {}", requirement.decided.word());
     let id = requirement.id.as_str();
     let mut deciders = Vec::new();

@@ -12,6 +12,7 @@ use serde::Serialize;
 use super::finding_group;
 use super::result::{AuditResult, FindingResult, SideResult, VehicleResult};
 use tck_base::verdict::Verdict;
+use tck_report::cause;
 use tck_report::clean::{line, short};
 
 /// How many findings of a kind are listed for people.
@@ -164,7 +165,7 @@ fn worst(result: &AuditResult) -> BTreeMap<Key<'_>, &FindingResult> {
     let mut all: BTreeMap<Key<'_>, &FindingResult> = BTreeMap::new();
     for (vehicle, side) in each(result) {
         for finding in &side.findings {
-            let place = finding_group::place(&finding.text);
+            let place = cause::place(&finding.text);
             let place = if place == finding.text {
                 String::new()
             } else {

@@ -6,14 +6,16 @@ use std::path::Path;
 
 use askama::Template;
 
+use super::cases::{cases, named, place};
 use super::join::restricted;
-use super::result::{AuditResult, FindingResult, Mistake, SideResult, VehicleResult};
+use super::mistakes::Mistake;
+use super::result::{AuditResult, FindingResult, SideResult, VehicleResult};
 use super::time_line::Span;
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_judge::Rules;
 use tck_pack::Pack;
 use tck_report::issues::{self, Issue};
-use tck_report::junit::{self, JunitError, Plain};
+use tck_report::junit::{self, JunitError};
 use tck_report::manifest::{Manifest, ManifestError};
 use tck_report::sources::Sources;
 use tck_report::statement::many;
@@ -102,7 +104,7 @@ pub fn markdown(result: &AuditResult) -> String {
                 mistake.worst.verdict.word().to_owned(),
                 named(vehicle, side),
                 mistake.requirements.join(", "),
-                mistake.worst.text.chars().take(300).collect(),
+                with_what_follows(&mistake),
                 mistake.count.to_string(),
                 place(mistake.worst, result),
             ];
@@ -111,6 +113,17 @@ pub fn markdown(result: &AuditResult) -> String {
         }
     }
     text
+}
+
+/// A mistake in a few words, and the requirements of what follows from it.
+fn with_what_follows(mistake: &Mistake<'_>) -> String {
+    let text: String = mistake.worst.text.chars().take(300).collect();
+    let mut follows: Vec<&str> = mistake.follows.iter().map(|one| one.requirement.as_str()).collect();
+    follows.dedup();
+    match follows.as_slice() {
+        [] => text,
+        all => format!("{text} (from it follow: {})", all.join(", ")),
+    }
 }
 
 /// What is broken, as issues in the recordings.
@@ -174,71 +187,6 @@ fn rows(result: &AuditResult) -> Vec<(&VehicleResult, &SideResult)> {
         std::cmp::Reverse((side.verdict, fails.count(), mistakes.len()))
     });
     all
-}
-
-fn named(vehicle: &VehicleResult, side: &SideResult) -> String {
-    let VehicleResult {
-        manufacturer,
-        serial_number,
-        protocol,
-        ..
-    } = vehicle;
-    let version = protocol.as_deref().unwrap_or("unknown");
-    format!("{manufacturer} {serial_number}, {} ({version})", side.role)
-}
-
-/// A case for each requirement that was decided, by vehicle and side.
-fn cases(result: &AuditResult) -> Vec<Plain> {
-    let mut all = Vec::new();
-    for vehicle in &result.vehicles {
-        for side in &vehicle.sides {
-            let suite = named(vehicle, side);
-            all.extend(side.requirements.iter().map(|decided| {
-                let findings = side.findings.iter().filter(|finding| finding.requirement == decided.id);
-                let texts: Vec<String> = findings.map(|finding| sentence(finding, result)).collect();
-                Plain {
-                    suite: suite.clone(),
-                    name: decided.id.clone(),
-                    verdict: Some(decided.verdict),
-                    text: texts.join("\n"),
-                }
-            }));
-        }
-    }
-    if result.verdict.is_none() {
-        all.push(Plain {
-            suite: "audit".to_owned(),
-            name: "something was judged".to_owned(),
-            verdict: Some(Verdict::Error),
-            text: "nothing was judged".to_owned(),
-        });
-    }
-    for (name, verdict, text) in restricted(result) {
-        all.push(Plain {
-            suite: "audit".to_owned(),
-            name: name.to_owned(),
-            verdict: Some(verdict),
-            text,
-        });
-    }
-    all
-}
-
-fn sentence(finding: &FindingResult, result: &AuditResult) -> String {
-    let place = place(finding, result);
-    format!(
-        "{} times at {place}, first {}, last {}: {}",
-        finding.count, finding.first, finding.last, finding.text
-    )
-}
-
-/// Where the first message stands that shows it.
-fn place(finding: &FindingResult, result: &AuditResult) -> String {
-    let recording = finding.recording.and_then(|file| result.recordings.get(file));
-    match recording.zip(finding.line) {
-        Some((recording, line)) => format!("{}:{line}", recording.name),
-        None => format!("message {}", finding.message),
-    }
 }
 
 #[derive(Template)]
@@ -587,7 +535,19 @@ mod tests {
         let document = roxmltree::Document::parse(&junit).expect("XML");
         let failures = document.descendants().filter(|node| node.has_tag_name("failure"));
         let types: Vec<&str> = failures.filter_map(|node| node.attribute("type")).collect();
-        assert!(types.contains(&"STATE-12") && types.contains(&"MODE-01"), "{types:?}");
+        // A failure for each mistake, by the requirement it is shown as.
+        let sides = result.vehicles.iter().flat_map(|vehicle| &vehicle.sides);
+        let mistakes = sides
+            .flat_map(SideResult::mistakes)
+            .filter(|mistake| mistake.worst.verdict == Verdict::Fail);
+        let mistakes: Vec<Vec<String>> = mistakes
+            .map(|mistake| mistake.requirements.iter().map(ToString::to_string).collect())
+            .collect();
+        let shown: std::collections::BTreeSet<&str> = mistakes.iter().map(|all| all[0].as_str()).collect();
+        assert_eq!(types.iter().copied().collect::<std::collections::BTreeSet<_>>(), shown);
+        for id in ["STATE-12", "MODE-01"] {
+            assert!(mistakes.iter().flatten().any(|known| known == id), "{mistakes:?}");
+        }
         let value: serde_json::Value = serde_json::from_str(&read("result.json")).expect("JSON");
         assert!(
             value["vehicles"][0]["timeLine"]["order"]

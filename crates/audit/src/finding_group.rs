@@ -33,31 +33,9 @@ pub(super) fn of(text: &str) -> String {
     cause
 }
 
-/// The place in a message that a sentence begins with, such as `state/orderId`; the whole sentence where it begins otherwise. Two
-/// sentences about one place of one message are about one mistake.
-pub(super) fn place(text: &str) -> &str {
-    match text.split_once(": ") {
-        Some((place, _)) if place.contains('/') && !place.contains([' ', '"']) => place,
-        _ => text,
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{of, place};
-
-    #[test]
-    fn a_place_is_told_from_a_sentence() {
-        assert_eq!(place("state/orderId: 7 is not of type string"), "state/orderId");
-        for whole in [
-            "state: \"not JSON\"",
-            "the way a/b: none",
-            "\"a/b\": odd",
-            "state/orderId",
-        ] {
-            assert_eq!(place(whole), whole);
-        }
-    }
+    use super::of;
 
     #[test]
     fn names_and_numbers_make_no_other_cause() {

@@ -10,6 +10,7 @@
 mod arrived;
 pub mod baseline;
 pub mod bundle;
+mod cases;
 mod continuity;
 mod conversation;
 mod dedup;
@@ -20,6 +21,7 @@ mod hint;
 pub mod join;
 mod message_check;
 mod misnamed;
+pub mod mistakes;
 mod mqtt_sessions;
 mod new_findings;
 mod outcome;
@@ -430,6 +432,7 @@ impl<'r> Audit<'r> {
             vehicles,
         };
         self.misnamed.tell(&mut result, self.rules, &self.options);
+        result.trace(&self.rules.catalogue);
         result.conclude();
         result
     }

@@ -2,7 +2,6 @@
 
 use bytes::Bytes;
 
-use super::finding_group;
 use super::header::header;
 use tck_base::clock::{Moment, Stamp};
 use tck_base::verdict::Verdict;
@@ -10,6 +9,7 @@ use tck_journal::event::{Direction, Event, Record, Source};
 use tck_journal::{Entry, Payload};
 use tck_judge::{Rules, TrafficJudge};
 use tck_pack::Pack;
+use tck_report::cause;
 use tck_suite::model::Recordings;
 use tck_view::Topic;
 
@@ -76,8 +76,8 @@ pub fn single(rules: &Rules, pack: &Pack, name: &str, payload: &Bytes) -> Vec<Fl
         if !matches!(finding.verdict, Verdict::Fail | Verdict::Warning) {
             continue;
         }
-        let place = finding_group::place(&finding.message);
-        match flaws.iter_mut().find(|flaw| finding_group::place(&flaw.text) == place) {
+        let place = cause::place(&finding.message);
+        match flaws.iter_mut().find(|flaw| cause::place(&flaw.text) == place) {
             // One mistake breaks several requirements, and the worst of it is said.
             Some(flaw) => {
                 let is_more = finding.message.len() > flaw.text.len();

@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::result::{AuditResult, Mistake, SideResult, Stretch, VehicleResult, Whereabouts, Whole, WholeDecided};
+use super::mistakes::Mistake;
+use super::result::{AuditResult, SideResult, Stretch, VehicleResult, Whereabouts, Whole, WholeDecided};
 use tck_base::verdict::Verdict;
 use tck_report::clean::{line, short};
 use tck_report::statement::many;
@@ -269,6 +270,16 @@ fn of_mistake(mistake: &Mistake<'_>, result: &AuditResult) -> String {
         worst.first
     );
     let _ = writeln!(text, "            {}", short(&line(&worst.text), 400));
+    for finding in &mistake.follows {
+        let place = placed(result, finding.recording, finding.line, finding.message);
+        let _ = writeln!(
+            text,
+            "            follows from it: {} {}, {}: {place}",
+            finding.requirement,
+            finding.monitor,
+            times(finding.count)
+        );
+    }
     text
 }
 

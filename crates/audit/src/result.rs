@@ -5,7 +5,6 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::finding_group;
 use super::time_line::TimeLine;
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_capture::{Counted, SourcePosition};
@@ -191,6 +190,9 @@ pub struct SideResult {
     pub judged: usize,
     /// Fails and warnings, the worst first.
     pub findings: Vec<FindingResult>,
+    /// The mistakes behind them, in the same order: one for each finding that follows from no other one. Of an audit that is over.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub causes: Vec<CauseResult>,
     /// What is worth knowing, and decides nothing.
     pub information: Vec<FindingResult>,
     /// The requirements that were decided.
@@ -290,15 +292,19 @@ pub struct HintResult {
     pub first: Whereabouts,
 }
 
-/// One mistake: every requirement that it breaks.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Mistake<'r> {
-    /// The requirements.
-    pub requirements: Vec<&'r str>,
-    /// The worst of what was found of it.
-    pub worst: &'r FindingResult,
-    /// How often.
-    pub count: u64,
+/// A finding that follows from no other one, and those that follow from it, by their numbers among the findings of the side,
+/// counted from 0.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct CauseResult {
+    /// The finding.
+    pub finding: usize,
+    /// The same thing, found as a breach of another requirement or by another monitor.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub same: Vec<usize>,
+    /// What rests on what it breaks.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub follows: Vec<usize>,
 }
 
 /// A requirement that was decided.
@@ -340,7 +346,8 @@ impl SideResult {
         let is_finding = |finding: &FindingResult| matches!(finding.verdict, Verdict::Fail | Verdict::Warning);
         let (mut findings, information): (Vec<_>, Vec<_>) = found.into_iter().partition(is_finding);
         findings.sort_by(|one, other| {
-            let key = |finding: &FindingResult| (std::cmp::Reverse(finding.verdict), finding.message);
+            let often = std::cmp::Reverse;
+            let key = |finding: &FindingResult| (often(finding.verdict), finding.message, often(finding.count));
             key(one).cmp(&key(other))
         });
         let mut verdict: Accumulated = findings.iter().map(|finding| finding.verdict).collect();
@@ -370,6 +377,7 @@ impl SideResult {
             verdict: verdict.get(),
             messages,
             judged,
+            causes: Vec::new(),
             findings,
             information,
             requirements: requirements.collect(),
@@ -379,33 +387,6 @@ impl SideResult {
             not_compared: 0,
             stretches: Vec::new(),
         }
-    }
-
-    /// What is wrong, mistake by mistake: what is found at one place of one message is one, whatever it breaks.
-    #[must_use]
-    pub fn mistakes(&self) -> Vec<Mistake<'_>> {
-        let mut all: Vec<Mistake<'_>> = Vec::new();
-        for finding in &self.findings {
-            let about = |finding: &FindingResult| (finding.message, finding_group::place(&finding.text).to_owned());
-            match all.iter_mut().find(|known| about(known.worst) == about(finding)) {
-                Some(known) => {
-                    let is_more = finding.verdict == known.worst.verdict && finding.text.len() > known.worst.text.len();
-                    if is_more {
-                        known.worst = finding;
-                    }
-                    if !known.requirements.contains(&finding.requirement.as_str()) {
-                        known.requirements.push(&finding.requirement);
-                    }
-                    known.count = known.count.max(finding.count);
-                }
-                None => all.push(Mistake {
-                    requirements: vec![&finding.requirement],
-                    worst: finding,
-                    count: finding.count,
-                }),
-            }
-        }
-        all
     }
 
     /// Takes back that something is kept where too little was seen; what is wrong is wrong.
@@ -517,8 +498,31 @@ impl SideResult {
             None => {
                 let at = self.findings.partition_point(|known| known.verdict >= verdict);
                 self.findings.insert(at, finding);
+                self.own_cause(at);
             }
         }
+    }
+}
+
+impl SideResult {
+    /// A finding has come to stand at this number, and follows from nothing, where it is known already what follows from what.
+    fn own_cause(&mut self, at: usize) {
+        if self.causes.is_empty() {
+            return;
+        }
+        for cause in &mut self.causes {
+            let moved = std::iter::once(&mut cause.finding)
+                .chain(&mut cause.same)
+                .chain(&mut cause.follows);
+            moved.filter(|number| **number >= at).for_each(|number| *number += 1);
+        }
+        let place = self.causes.partition_point(|cause| cause.finding < at);
+        let own = CauseResult {
+            finding: at,
+            same: Vec::new(),
+            follows: Vec::new(),
+        };
+        self.causes.insert(place, own);
     }
 }
 

@@ -8,7 +8,7 @@ use std::time::Duration;
 use crate::finding::{broken, quote, remark};
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_view::{ActionView, MessageView, StateView};
+use tck_view::{ActionView, ErrorView, InstantActionsView, MessageView, Names, StateView};
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// How many actions are kept in mind, and how many one message may have to be judged.
@@ -20,8 +20,9 @@ pub(super) const ANSWERED: Check = Check {
     name: "instant/answered",
     decides: &["IACT-03"],
     doc: "Each action of an instantActions message that obeys the schema is in actionStates within time.react, as long as \
-          no new order is accepted. Not judged while the harness disturbs the link, nor over a restart, nor with more than \
-          eight actions in one message.",
+          no new order is accepted. A vehicle whose error says that it lacks the list under the name of version 1.1 is told so \
+          at once. Not judged while the harness disturbs the link, nor over a restart, nor with more than eight actions in \
+          one message.",
     arguments: &[],
     listens: &[
         Listen::Connect,
@@ -249,6 +250,33 @@ impl Answered {
         }
     }
 
+    /// A vehicle that says by an error that it looks for the actions under the name that 1.1 had for their list.
+    fn misnamed(&mut self, state: &StateView, names: &Names, seq: u64, findings: &mut Vec<CheckFinding>) {
+        let open = |asked: &&mut Asked| !asked.listed && !asked.told;
+        let (Some(old), Some(new)) = (
+            names.name(InstantActionsView::misnamed_actions),
+            names.name(InstantActionsView::actions),
+        ) else {
+            return;
+        };
+        let mut errors = state.errors.iter().take(ACTIONS);
+        if self.requirement != "IACT-03" || !errors.any(|error| asks_for(error, old, new)) {
+            return;
+        }
+        let mut told = self.asked.values_mut().filter(open).peekable();
+        if told.peek().is_none() {
+            return;
+        }
+        told.for_each(|asked| asked.told = true);
+        let text = format!(
+            "the vehicle listens to {}, the name that version 1.1 had for {}: its own error says that it misses it, and no instant \
+             action reaches it",
+            quote(old),
+            quote(new)
+        );
+        findings.push(broken("IACT-03", seq, text));
+    }
+
     fn listed(
         &mut self,
         state: &StateView,
@@ -302,6 +330,28 @@ impl Answered {
     }
 }
 
+/// Whether an error says that a message lacks a member of the old name, and not one of the new name. As a member it stands in
+/// quotes or as a JSON pointer; a topic stands behind other levels.
+fn asks_for(error: &ErrorView, old: &str, new: &str) -> bool {
+    let names = |text: &str, name: &str| {
+        let marks = [("'", "'"), ("\"", "\""), ("`", "`")];
+        let quoted = marks
+            .iter()
+            .any(|(open, close)| text.contains(&format!("{open}{name}{close}")));
+        let pointer = |begin: &str| {
+            let end = |rest: &str| !rest.starts_with(|next: char| next.is_ascii_alphanumeric());
+            text.split(&format!("{begin}/{name}")).skip(1).any(end)
+        };
+        quoted || pointer("#") || pointer(" ")
+    };
+    let texts = [&error.error_description, &error.error_hint];
+    texts.into_iter().filter_map(|text| text.text()).any(|text| {
+        let low = text.to_ascii_lowercase();
+        let lacks = low.contains("required") || low.contains("missing");
+        lacks && !low.contains("topic") && names(text, old) && !names(text, new)
+    })
+}
+
 /// Whether the table of predefined actions has this one, and not for instantActions. What is written about
 /// finePositioning contradicts itself.
 fn is_misplaced(kind: &str, context: &CheckContext<'_>) -> bool {
@@ -341,6 +391,7 @@ impl Running for Answered {
         }
         let mut found = Vec::new();
         self.listed(state, now, record.seq(), context, limits, &mut found);
+        self.misnamed(state, record.names(), record.seq(), &mut found);
         self.missing(now, record.seq(), renewed, limits, &mut found);
         let mine = |finding: &CheckFinding| {
             finding
@@ -411,6 +462,37 @@ mod tests {
         assert_eq!(judge(&both, &[("b", "FAILED")], 10.0), ["IACT-07 warning"]);
         assert_eq!(judge(&both, &[("b", "FAILED")], 40.0), ["IACT-07", "IACT-03"]);
         assert_eq!(judge(&both[..1], &[], 40.0), ["IACT-03"]);
+    }
+
+    #[test]
+    fn a_vehicle_that_listens_to_the_name_of_1_1_is_told_so_once() {
+        let judge = |description: &str| {
+            let mut trace = Trace::subscriber();
+            trace.state(&json!({}));
+            sends(&mut trace, &[("a", "stateRequest"), ("b", "dance")]);
+            let error =
+                json!({ "errorType": "validationError", "errorLevel": "WARNING", "errorDescription": description });
+            trace.wait(0.2).state(&json!({ "errors": [error] }));
+            trace.wait(40.0).state(&json!({ "errors": [error] }));
+            trace.judge("instant/answered")
+        };
+        for own in [
+            "must have required property 'instantActions'",
+            "Invalid VDA 5050 InstantActions at #/allOf/1/required, #/instantActions",
+            "missing field `instantActions` at line 1",
+        ] {
+            let found = judge(own);
+            assert_eq!(found.summary(), ["IACT-03"], "{own}");
+        }
+        // A topic, or the right name, says nothing of the kind: two actions get no state.
+        for other in [
+            "'actions' is a required property of 'instantActions'",
+            "uagv/v2/KIT/0001/instantActions: a required member is missing",
+            "topic 'instantActions': required member missing",
+            "",
+        ] {
+            assert_eq!(judge(other).summary(), ["IACT-03", "IACT-03"], "{other}");
+        }
     }
 
     #[test]

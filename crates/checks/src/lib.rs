@@ -18,6 +18,7 @@ mod connection_offline;
 mod errors;
 mod errors_blame;
 mod errors_event;
+mod errors_explained;
 mod errors_lingering;
 mod errors_ready;
 mod factsheet;
@@ -115,6 +116,7 @@ pub static REGISTRY: &[Check] = &[
     trajectory::TRAJECTORY_ENDS,
     trajectory::PLANNED_PATH,
     state::battery::LEVELS,
+    state::battery::PERCENT,
     state::loads::LOADS,
     state::joint_loads::JOINT_LOADS,
     visualization::RATE,
@@ -125,6 +127,7 @@ pub static REGISTRY: &[Check] = &[
     errors_ready::READY,
     errors_event::ON_EVENT,
     errors_blame::BLAME,
+    errors_explained::EXPLAINS,
     factsheet::CONSISTENCY,
     factsheet::LIMITS,
     factsheet_actions::PREDEFINED,

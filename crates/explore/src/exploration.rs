@@ -144,6 +144,15 @@ const ATTEMPTS: usize = 3;
 /// How often it is asked what the device is made for, with other ways to the stimuli of which that is not known yet.
 const GATES: usize = 4;
 
+/// The share of the time after which stimuli are not tried one by one any more before there were conversations.
+const ALONE_AT_FIRST: f64 = 0.15;
+
+/// The share of the time after which what was found is made shorter.
+const SHRINKING_BEGINS: f64 = 0.7;
+
+/// Why there are no conversations with a device that has no stimulus to begin one.
+const SAYS_NOTHING: &str = "the device is made for nothing that may be said to it at first";
+
 /// How many rounds in a row may come to nothing.
 const FRUITLESS: usize = 2;
 
@@ -212,8 +221,21 @@ impl Exploration {
             undecided: (0, None),
         };
         if self.meet(&mut known, stage)? {
-            self.probe(&mut known, stage, note)?;
+            let mut left = self.to_try(&known);
+            let all = left.len();
+            note(&format!("trying {all} stimuli one by one"));
+            // A slow device comes to conversations, too, and what there was no time for comes behind them.
+            self.probe(&mut known, &mut left, (&mut *stage, ALONE_AT_FIRST))?;
+            if !left.is_empty() {
+                note(&format!(
+                    "{} of them were tried before the conversations",
+                    all - left.len()
+                ));
+            }
             self.converse(&mut known, stage, note)?;
+            if self.budget.is_some() && known.undecided.1.as_deref() != Some(SAYS_NOTHING) {
+                self.probe(&mut known, &mut left, (&mut *stage, SHRINKING_BEGINS))?;
+            }
         }
         let shown = self.shrink_all(&mut known, stage, note)?;
         let (findings, remarks): (Vec<Shown>, Vec<Shown>) = shown.into_iter().partition(Shown::is_certain);
@@ -295,10 +317,8 @@ impl Exploration {
         Ok(true)
     }
 
-    /// Tries every stimulus by the shortest way, in the order of the seed: what there is no time for is different from run to
-    /// run.
-    fn probe<S: Stage>(&self, known: &mut Known, stage: &mut S, note: &mut dyn FnMut(&str)) -> Result<(), S::Error> {
-        const SHARE: f64 = 0.3;
+    /// Every stimulus by the shortest way, in the order of the seed: what there is no time for is different from run to run.
+    fn to_try(&self, known: &Known) -> Vec<(Chain, ConversationFile)> {
         let ways = Chain::to_every_kind(&known.grammar);
         let mut probes: Vec<(Chain, ConversationFile)> = ways
             .into_iter()
@@ -311,13 +331,21 @@ impl Exploration {
         if self.budget.is_some() {
             Random::new(self.seed).shuffle(&mut probes);
         }
-        let all = probes.len();
-        note(&format!("trying {all} stimuli one by one"));
+        probes
+    }
+
+    /// Tries stimuli one by one until a share of the time is over. What it did not come to is left.
+    fn probe<S: Stage>(
+        &self,
+        known: &mut Known,
+        probes: &mut Vec<(Chain, ConversationFile)>,
+        (stage, share): (&mut S, f64),
+    ) -> Result<(), S::Error> {
         let mut fruitless = 0;
-        while !probes.is_empty() && fruitless < FRUITLESS && !self.is_over(stage, SHARE) {
+        while !probes.is_empty() && fruitless < FRUITLESS && !self.is_over(stage, share) {
             let files: Vec<ConversationFile> = probes.iter().map(|(_, file)| file.clone()).collect();
-            let round = stage.carry_out(&files, Purpose::Probe, self.left(stage, SHARE))?;
-            known.learn(&round, &probes);
+            let round = stage.carry_out(&files, Purpose::Probe, self.left(stage, share))?;
+            known.learn(&round, probes);
             let before = probes.len();
             // There is no place for it on the floor. Where the run broke off, there may be another reason.
             let named = |file: &ConversationFile| round.result.tests.iter().find(|test| test.id == file.id);
@@ -332,34 +360,28 @@ impl Exploration {
             probes.retain(|(_, file)| named(file).is_none_or(is_left));
             fruitless = if probes.len() == before { fruitless + 1 } else { 0 };
         }
-        if !probes.is_empty() {
-            note(&format!(
-                "{} of them were tried in their part of the time",
-                all - probes.len()
-            ));
-        }
         Ok(())
     }
 
     /// Holds conversations: a few are drawn, carried out, and what came of them is known to those that are drawn next.
     fn converse<S: Stage>(&self, known: &mut Known, stage: &mut S, note: &mut dyn FnMut(&str)) -> Result<(), S::Error> {
-        const SHARE: f64 = 0.7;
         let mut random = Random::new(self.seed);
         let (mut number, mut fruitless) = (0, 0);
-        while number < self.conversations && fruitless < FRUITLESS {
+        // One that does not begin, because its device was gone, is drawn anew.
+        while known.conversations < self.conversations && fruitless < FRUITLESS {
             // What was found has to be made shorter, which takes time as well.
-            let share = match self.is_over(stage, SHARE) {
-                false => SHARE,
+            let share = match self.is_over(stage, SHRINKING_BEGINS) {
+                false => SHRINKING_BEGINS,
                 true if known.found.is_empty() && !self.is_over(stage, 1.0) => 1.0,
                 true => break,
             };
-            let until = self.conversations.min(number + self.at_once.max(1));
+            let until = number + self.at_once.max(1).min(self.conversations - known.conversations);
             let drawn: Vec<(Chain, ConversationFile)> = (number + 1..=until)
                 .map(|number| self.one(&known.grammar, &mut random, number, &mut known.coverage))
                 .collect();
             number = until;
             if drawn.iter().all(|(chain, _)| chain.stimuli().is_empty()) {
-                known.undecided.1 = Some("the device is made for nothing that may be said to it at first".to_owned());
+                known.undecided.1 = Some(SAYS_NOTHING.to_owned());
                 break;
             }
             let files: Vec<ConversationFile> = drawn.iter().map(|(_, file)| file.clone()).collect();

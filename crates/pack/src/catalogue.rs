@@ -216,6 +216,9 @@ pub struct Requirement {
     /// What the other reading would be.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub otherwise: Option<String>,
+    /// The requirements that have to be kept for it to be decided: where one of them is broken, a breach of this one follows.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub rests_on: Vec<RequirementId>,
     /// Where it is tracked, for a requirement of somebody's own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub link: Option<String>,
@@ -288,6 +291,16 @@ impl Catalogue {
                 );
             }
             catalogue.requirements.push(requirement);
+        }
+        for requirement in &catalogue.requirements {
+            let unknown = requirement
+                .rests_on
+                .iter()
+                .filter(|id| catalogue.get(id.as_str()).is_none());
+            problems.extend(unknown.map(|id| {
+                let title = format!("{} rests on {id}, which there is not", requirement.id);
+                Diagnostic::whole("unknown-requirement", title)
+            }));
         }
         if catalogue.requirements.is_empty() && problems.is_empty() {
             problems.push(
@@ -400,6 +413,26 @@ mod tests {
                 .unwrap()
                 .ends_with("VDA5050_EN.md#6641-vehicle-gets-a-malformed-new-order")
         );
+    }
+
+    #[test]
+    fn nothing_rests_on_what_rests_on_it() {
+        let catalogue = catalogue();
+        let mut resting = 0;
+        for requirement in catalogue.all() {
+            resting += usize::from(!requirement.rests_on.is_empty());
+            let (mut open, mut seen) = (vec![requirement], BTreeSet::new());
+            while let Some(next) = open.pop() {
+                for id in &next.rests_on {
+                    let below = catalogue.get(id.as_str()).unwrap();
+                    assert_ne!(below.id, requirement.id, "by {}", next.id);
+                    if seen.insert(below.id.clone()) {
+                        open.push(below);
+                    }
+                }
+            }
+        }
+        assert!(resting > 30, "{resting}");
     }
 
     #[test]

@@ -42,7 +42,7 @@ pub(super) fn read(source: &Arc<Source>, problems: &mut Vec<Diagnostic>) -> Opti
     Some(Chapter { position, requirements })
 }
 
-const KEYS: [&str; 14] = [
+const KEYS: [&str; 15] = [
     "id",
     "text",
     "role",
@@ -56,6 +56,7 @@ const KEYS: [&str; 14] = [
     "interpretation",
     "because",
     "otherwise",
+    "rests-on",
     "link",
 ];
 
@@ -112,6 +113,7 @@ impl Reader<'_> {
             interpretation: node.get("interpretation").and_then(|text| self.as_text(text)),
             because: node.get("because").and_then(|text| self.as_text(text)),
             otherwise: node.get("otherwise").and_then(|text| self.as_text(text)),
+            rests_on: self.rests_on(node),
             link: node.get("link").and_then(|link| self.link(link)),
             is_own: false,
         };
@@ -121,6 +123,15 @@ impl Reader<'_> {
             }
         }
         Some((place.span.clone(), requirement))
+    }
+
+    /// The ids of what has to be kept for it to be decided.
+    fn rests_on(&mut self, node: &Node) -> Vec<RequirementId> {
+        let Some(all) = node.get("rests-on").and_then(|_| self.list(node, "rests-on")) else {
+            return Vec::new();
+        };
+        let ids = all.iter().filter_map(|id| self.as_text(id));
+        ids.map(|id| RequirementId::from(id.as_str())).collect()
     }
 
     /// A reason belongs to a ruling.

@@ -4,7 +4,7 @@
 
 use std::fmt::Write as _;
 
-use super::findings::PROGRAM;
+use super::findings::{PROGRAM, is_told_by_tests};
 use super::repeated;
 use super::sources::Sources;
 use super::statement;
@@ -79,7 +79,8 @@ pub fn cases<'a>(result: &'a RunResult, sources: &'a Sources) -> Vec<Case<'a>> {
     for group in groups {
         all.extend(tests.iter().filter(|test| test.suite == group).cloned());
     }
-    all.extend(result.monitors.iter().map(|monitor| of_monitor(monitor, sources)));
+    let monitors = result.monitors.iter();
+    all.extend(monitors.map(|monitor| of_monitor(monitor, is_told_by_tests(monitor, result), sources)));
     all
 }
 
@@ -198,7 +199,8 @@ fn finding(decision: &Decision) -> String {
     text
 }
 
-fn of_monitor<'a>(monitor: &'a MonitorResult, sources: &'a Sources) -> Case<'a> {
+/// `told` says that failed tests show all that it has failed for: a mistake is one failure.
+fn of_monitor<'a>(monitor: &'a MonitorResult, told: bool, sources: &'a Sources) -> Case<'a> {
     let mut findings: Vec<_> = monitor.findings.iter().collect();
     findings.sort_by_key(|finding| std::cmp::Reverse(finding.verdict));
     let message = match (findings.first(), monitor.verdict) {
@@ -219,15 +221,21 @@ fn of_monitor<'a>(monitor: &'a MonitorResult, sources: &'a Sources) -> Case<'a> 
     });
     let details = lines.collect::<Vec<_>>().join("\n");
     let known = sources.monitor(&monitor.id);
+    let kind = findings.first().map_or("", |finding| finding.requirement.as_str());
+    let (verdict, message) = if told {
+        (None, format!("the tests that failed show it: {kind}: {message}"))
+    } else {
+        (monitor.verdict, message.to_owned())
+    };
     Case {
         suite: MONITORS,
         name: monitor.id.clone(),
         title: &monitor.title,
         seconds: 0.0,
-        verdict: monitor.verdict,
-        kind: findings.first().map_or("", |finding| finding.requirement.as_str()),
-        message: message.to_owned(),
-        remark: (monitor.verdict == Some(Verdict::Warning)).then(|| details.clone()),
+        verdict,
+        kind,
+        message,
+        remark: (told || verdict == Some(Verdict::Warning)).then(|| details.clone()),
         details,
         requirements: known.map_or_else(Vec::new, |known| {
             known.requirements.iter().map(String::as_str).collect()

@@ -273,6 +273,8 @@ fn requirement_case<'a>(
     // What applies and was not decided is no pass, and what no test can decide is nobody's fault.
     let verdict = match statement::gap(requirement) {
         Some(Gap::NotDecided) => Some(Verdict::Inconclusive),
+        // A mistake is one failure, and what follows from it none.
+        _ if finding.is_some_and(|finding| finding.follows.is_some()) => None,
         _ => requirement.verdict,
     };
     let gap = requirement.not_decided.as_ref().map(ToString::to_string);

@@ -10,6 +10,7 @@ pub mod advice;
 pub mod allure;
 pub mod attestation;
 pub mod cases;
+pub mod cause;
 pub mod certificate;
 pub mod clean;
 pub mod compare;

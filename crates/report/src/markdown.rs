@@ -219,6 +219,7 @@ mod tests {
             interpretation: Some("Read as that.".to_owned()),
             decided: HowDecided::Passive,
             action: None,
+            rests_on: Vec::new(),
         };
         let mut other = library.clone();
         "A-2".clone_into(&mut other.id);

@@ -29,6 +29,15 @@ impl Sources {
         self.requirements.iter().find(|requirement| requirement.id == id)
     }
 
+    /// The requirements that have to be kept for this one to be decided.
+    #[must_use]
+    pub fn rests_on(&self, id: &str) -> Vec<&str> {
+        let known = self.requirement(id).into_iter();
+        known
+            .flat_map(|known| known.rests_on.iter().map(String::as_str))
+            .collect()
+    }
+
     /// The path of a file of the suites where whoever gave it finds it.
     #[must_use]
     pub fn as_given<'a>(&'a self, path: &'a str) -> &'a str {
@@ -71,6 +80,8 @@ pub struct RequirementText {
     pub decided: HowDecided,
     /// The action it is about, when it binds only a vehicle that offers that action.
     pub action: Option<String>,
+    /// The requirements that have to be kept for it to be decided.
+    pub rests_on: Vec<String>,
 }
 
 /// How a requirement can be decided.

@@ -47,6 +47,7 @@ pub fn sources(library: &Library, pack: &Pack) -> Sources {
             link: requirement.link_in(pack),
             interpretation: requirement.interpretation.clone(),
             action: requirement.needs.iter().find_map(|need| offered(need)),
+            rests_on: requirement.rests_on.iter().map(ToString::to_string).collect(),
             decided: match &requirement.decided {
                 Decided::Active => HowDecided::Active,
                 Decided::Passive => HowDecided::Passive,

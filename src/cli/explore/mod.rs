@@ -15,7 +15,7 @@ use super::reference::{self, Asked};
 use stage::{Device, OnStage};
 use tck_base::diagnostic::Diagnostic;
 use tck_base::verdict::Verdict;
-use tck_explore::{Chain, ConversationFile, Exploration, Grammar, Purpose, Shown, Stage as _};
+use tck_explore::{Chain, ConversationFile, Exploration, Grammar, Purpose, Shown, Stage as _, family};
 use tck_profile::{self as profile, Surroundings};
 
 /// How much more often a stimulus is drawn on which the exploration is focused.
@@ -24,8 +24,8 @@ const FOCUS: u32 = 20;
 /// In how many rounds conversations are held at most, each of which has a report.
 const MOST_ROUNDS: usize = 10;
 
-/// How many conversations a round has at least.
-const AT_ONCE: usize = 4;
+/// How many conversations a round has at least: to start the device and to write the report takes as long for one as for all.
+const AT_ONCE: usize = 8;
 
 /// `explore`.
 pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
@@ -122,7 +122,9 @@ fn focused(mut grammar: Grammar, focus: &[String]) -> Result<Grammar, Problem> {
     let mut named = BTreeSet::new();
     for pattern in focus {
         let names = grammar.stimuli.keys();
-        let matching: Vec<&String> = names.filter(|name| tck_run::matches(pattern, name)).collect();
+        // One that stands for many is named as in the grammar.
+        let fits = |name: &&String| tck_run::matches(pattern, name) || tck_run::matches(pattern, family(name));
+        let matching: Vec<&String> = names.filter(fits).collect();
         if matching.is_empty() {
             let names = grammar.stimuli.keys().map(String::as_str);
             let hint = match tck_base::diagnostic::closest(pattern, names) {

@@ -135,6 +135,7 @@ pub fn sources() -> Sources {
                     "The table of error types is read as binding; another type is accepted with a remark only where the text gives none.".to_owned()
                 }),
                 action: None,
+                rests_on: Vec::new(),
                 decided: match *how {
                     "active" => HowDecided::Active,
                     "passive" => HowDecided::Passive,

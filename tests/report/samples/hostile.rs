@@ -237,6 +237,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
             interpretation: Some(evil()),
             decided: HowDecided::NotTestable(evil()),
             action: Some(evil()),
+            rests_on: vec![evil()],
         }],
         tests: vec![TestSource {
             id: format!("{HOSTILE}/fail"),

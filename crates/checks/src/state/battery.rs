@@ -1,10 +1,10 @@
-//! `state/battery-levels`: a vehicle that only knows good and bad says so with 80 and 20 percent.
+//! `state/battery-levels`, `state/charge-in-percent`: what a vehicle says of its charge, over a run.
 
 use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use crate::finding::broken;
+use crate::finding::{broken, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_view::{BatteryState, StateView};
 use tck_world::{End, Listen, Observation, Topic};
@@ -21,6 +21,57 @@ pub(crate) const LEVELS: Check = Check {
     needs: &[StateView::battery_state, BatteryState::battery_charge],
     start: |_| Box::new(Levels::default()),
 };
+
+/// The charge is in percent, and no share of one.
+pub(crate) const PERCENT: Check = Check {
+    name: "state/charge-in-percent",
+    decides: &["STATE-MSG-15"],
+    doc: "A vehicle that drives has more than one percent of charge: a remark when ten states of a vehicle that drives show a \
+          charge above 0 and up to 1, and no state of it shows more. A vehicle that stands may be as good as empty.",
+    arguments: &[],
+    listens: &[Listen::Delivered(Topic::State)],
+    reads: &[],
+    needs: &[StateView::battery_state, BatteryState::battery_charge],
+    start: |_| Box::new(Percent::default()),
+};
+
+/// So many states of a vehicle that drives show what its charge is counted in.
+const DRIVING: usize = 10;
+
+#[derive(Default)]
+struct Percent {
+    /// States of a vehicle that drives with a charge of one percent at most.
+    low: usize,
+    /// Nothing more is to be learned: it was more once, or it was told.
+    known: bool,
+}
+
+impl Running for Percent {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let Some(state) = record.state().filter(|_| !self.known) else {
+            return false;
+        };
+        let charge = state
+            .battery_state
+            .there()
+            .and_then(|battery| battery.battery_charge.float());
+        let Some(charge) = charge else { return false };
+        if charge > 1.0 {
+            self.known = true;
+            return false;
+        }
+        self.low += usize::from(charge > 0.0 && state.driving.is(true));
+        if self.low >= DRIVING {
+            self.known = true;
+            let text = format!(
+                "the vehicle drives with a charge of {charge} percent, and none of its states shows more than 1: a share of one \
+                 belongs into percent"
+            );
+            findings.push(remark("STATE-MSG-15", record.seq(), text));
+        }
+        false
+    }
+}
 
 /// A battery that is measured does not jump this far, in percent.
 const JUMP: f64 = 30.0;
@@ -80,6 +131,25 @@ mod tests {
     use serde_json::json;
 
     use crate::trace::Trace;
+
+    fn driven(charges: &[f64], driving: bool) -> Vec<String> {
+        let mut trace = Trace::subscriber();
+        for charge in charges {
+            trace.state(&json!({ "driving": driving, "batteryState": { "batteryCharge": charge } }));
+        }
+        trace.judge("state/charge-in-percent").summary()
+    }
+
+    #[test]
+    fn a_share_of_one_is_no_percentage() {
+        assert_eq!(driven(&[0.8; 30], true), ["STATE-MSG-15 warning"]);
+        // As good as empty it stands, and nobody can tell.
+        assert!(driven(&[0.8; 30], false).is_empty());
+        assert!(driven(&[0.8; 9], true).is_empty());
+        let falling = [1.4, 1.2, 1.0, 0.8, 0.6, 0.6, 0.6, 0.5, 0.5, 0.5, 0.4, 0.4, 0.4];
+        assert!(driven(&falling, true).is_empty());
+        assert!(driven(&[0.0; 30], true).is_empty());
+    }
 
     fn judge(charges: &[f64]) -> Vec<String> {
         let mut trace = Trace::subscriber();

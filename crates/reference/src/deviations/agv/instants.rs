@@ -42,6 +42,21 @@ records! {
                 true
             })
             .hears(|deaf, _, name, _| name != "instantActions" || !*deaf);
+    fault "instant-list-of-version-1-1" ["IACT-03", "ORD-CANCEL-07", "ACT-26", "TOPIC-11"] "It looks for instant actions under the name that version 1.1 had for their list, and reports that it misses it."
+        => plain().hears(|(), agv, name, payload| {
+            let message = serde_json::from_slice::<Value>(payload).unwrap_or_default();
+            let lacks = name == "instantActions" && message.get("instantActions").is_none();
+            if lacks {
+                agv.errors.raise(ActiveError {
+                    error_type: agv.config.errors.validation.clone(),
+                    fatal: false,
+                    references: vec![("topic".into(), "instantActions".into())],
+                    description: "must have required property 'instantActions'".to_owned(),
+                    life: Life::UntilNewOrder,
+                });
+            }
+            !lacks
+        });
     fault "malformed-instant-stops-order" ["ORD-06"] "Gives its order up when an instant action is malformed."
         => when(Event::InstantUnreadable, |agv| agv.give_up_order()).raises(|_, agv, cause, _| {
             if matches!(cause, Cause::Unreadable(_)) {
