@@ -14,8 +14,10 @@ mod graph;
 mod layout;
 mod lif;
 mod outward;
+pub mod picture;
 #[cfg(test)]
 mod tests;
+mod trail;
 mod ways;
 
 use std::collections::BTreeMap;
@@ -23,6 +25,7 @@ use std::collections::BTreeMap;
 use serde_json::{Map, Value};
 
 pub use layout::{BUILT_IN_MAP, BUILT_IN_UPPER_MAP, Edge, Layout, Node};
+pub use trail::{GivesUp, Trail};
 pub use ways::Station;
 
 use tck_base::diagnostic::{Diagnostic, Source};
