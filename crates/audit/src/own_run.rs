@@ -87,6 +87,7 @@ pub fn own_run(
         vantage: header.vantage,
         hints: Vec::new(),
         time_line: TimeLine::default(),
+        courses: Vec::new(),
         sides: vec![side],
     })
 }

@@ -11,6 +11,7 @@ pub mod attestation;
 pub mod certificate;
 pub mod clean;
 pub mod compare;
+pub mod course;
 pub mod coverage;
 pub mod findings;
 pub mod fleet;
