@@ -337,14 +337,16 @@ pub(super) fn escaped(text: &str) -> String {
             '>' => safe.push_str("&gt;"),
             '"' => safe.push_str("&quot;"),
             '\'' => safe.push_str("&#39;"),
-            '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{fff0}'..='\u{ffff}' => {
-                safe.push(' ')
-            }
-            c if c.is_control() => safe.push(' '),
+            c if c.is_control() || steers(c) => safe.push(' '),
             c => safe.push(c),
         }
     }
     safe
+}
+
+/// Whether a character changes the direction or the joining of what follows, has no width, or is none.
+fn steers(c: char) -> bool {
+    matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff0}'..='\u{ffff}')
 }
 
 #[cfg(test)]
