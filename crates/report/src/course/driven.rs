@@ -54,8 +54,8 @@ struct Place {
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Moment {
     place: Option<Place>,
-    order: String,
-    update: Option<u64>,
+    /// The order that the vehicle names, by the number of its message.
+    order: Option<u64>,
     node: String,
     driving: Option<bool>,
 }
@@ -65,6 +65,8 @@ struct Moment {
 pub struct Driven {
     bounds: Bounds,
     orders: VecDeque<Route>,
+    /// The order that the vehicle names.
+    order: String,
     nodes: Places,
     /// By map, with the number of the message and the heading.
     trails: BTreeMap<String, Trail<(u64, Option<f64>)>>,
@@ -82,6 +84,7 @@ impl Driven {
         Self {
             bounds,
             orders: VecDeque::new(),
+            order: String::new(),
             nodes: Places::default(),
             trails: BTreeMap::new(),
             now: Moment::default(),
@@ -128,14 +131,20 @@ impl Driven {
 
     fn says(&mut self, number: u64, state: &StateView) {
         for (known, said) in [
-            (&mut self.now.order, state.order_id.or_empty()),
+            (&mut self.order, state.order_id.or_empty()),
             (&mut self.now.node, state.last_node_id.or_empty()),
         ] {
             if *known != said {
                 *known = name(said);
             }
         }
-        self.now.update = state.order_update_id.whole();
+        let update = state.order_update_id.whole();
+        let mut newest = self.orders.iter_mut().rev();
+        let named = newest.find(|route| route.order == self.order && route.update == update);
+        self.now.order = named.map(|route| {
+            route.named.get_or_insert(number);
+            route.message
+        });
         self.now.driving = state.driving.flag();
         self.has_driven |= self.now.driving == Some(true);
         if let Some(place) = state.position.there().and_then(place) {
@@ -198,11 +207,19 @@ impl Driven {
     }
 
     /// The order in hand at a message: the one that the vehicle names, or else the last one that was sent before.
-    fn order(&self, number: u64, moment: &Moment) -> Option<&Route> {
-        let sent = || self.orders.iter().rev().filter(move |route| route.message <= number);
-        let named = sent().find(|route| route.order == moment.order && route.update == moment.update);
+    fn order_at(&self, number: u64, moment: &Moment) -> Option<&Route> {
+        let mut all = self.orders.iter();
+        let named = moment
+            .order
+            .and_then(|message| all.find(|route| route.message == message));
+        let earlier = |at: Option<u64>| at.is_some_and(|at| at <= number);
+        let named_before = || self.orders.iter().filter(|route| earlier(route.named));
+        let sent_before = || self.orders.iter().rfind(|route| earlier(Some(route.message)));
         // Of many updates only the last are kept.
-        named.or_else(|| sent().next()).or_else(|| self.orders.front())
+        named
+            .or_else(|| named_before().max_by_key(|route| route.named))
+            .or_else(sent_before)
+            .or_else(|| self.orders.front())
     }
 
     /// The picture, with where the vehicle was at these findings, the worst first; its order and its map are those of the
@@ -223,7 +240,7 @@ impl Driven {
         }
         let first = found.first().map_or(u64::MAX, |(number, _)| *number);
         let moment = self.at(first);
-        let route = self.order(first, &moment);
+        let route = self.order_at(first, &moment);
         let last = self.now.place.as_ref();
         let on = moment.place.as_ref().or(last).map(|place| place.spot.map.as_str());
         let map = on.or_else(|| route.and_then(Route::map))?.to_owned();

@@ -65,6 +65,8 @@ pub(super) struct Route {
     pub message: u64,
     pub order: String,
     pub update: Option<u64>,
+    /// Number of the first message in which the vehicle names it.
+    pub named: Option<u64>,
     nodes: Vec<RouteNode>,
     edges: Vec<RouteEdge>,
 }
@@ -92,6 +94,7 @@ impl Route {
             message,
             order: id,
             update: order.order_update_id.whole(),
+            named: None,
             nodes,
             edges,
         }
