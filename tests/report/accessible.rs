@@ -88,6 +88,7 @@ fn axe_finds_nothing_in_any_page() {
             html::render(&hostile, &hostile_sources, Some(&hostile_journal)).expect("html"),
         ),
         ("fleet", fleet()),
+        ("course", crate::course::page()),
         (
             "certificate",
             certificate::render(&certified(pass), &sources, ROOT).expect("a certificate"),

@@ -310,7 +310,8 @@ fn messages_are_bounded_however_much_was_recorded() {
 #[ignore = "writes files for a person to look at"]
 fn write_the_samples_for_a_person_to_look_at() {
     let dir = std::env::var("REPORT_SAMPLES").expect("REPORT_SAMPLES names a folder");
-    for (name, page) in ["pass", "fail", "hostile", "bare"].iter().zip(pages()) {
+    let pages = pages().into_iter().chain([crate::course::page()]);
+    for (name, page) in ["pass", "fail", "hostile", "bare", "course"].iter().zip(pages) {
         std::fs::write(format!("{dir}/{name}.html"), page).expect("write");
     }
 }

@@ -4,6 +4,7 @@
 
 mod accessible;
 mod certificate;
+mod course;
 mod foreign;
 mod html;
 mod json;

@@ -47,6 +47,7 @@ fn a_report_holds_at_every_width() {
             "hostile",
             html::render(&hostile, &hostile_sources, Some(&hostile_journal)),
         ),
+        ("course", Ok(crate::course::page())),
     ];
     let folder = tempfile::tempdir().expect("a folder");
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/page/narrow.js");

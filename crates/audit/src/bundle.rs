@@ -24,6 +24,8 @@ use tck_report::statement::many;
 const DRAWN: usize = 500;
 /// How wide a time line is.
 const WIDTH: f64 = 1000.0;
+/// How many pictures of courses the page has; the result holds all.
+const COURSES: usize = 60;
 /// How many columns the overview has; what is found more seldom stands with the vehicles.
 const COLUMNS: usize = 20;
 /// How high each of its tracks is.
@@ -243,6 +245,8 @@ struct Shown<'a> {
     seen: String,
     tracks: Vec<Track>,
     height: usize,
+    /// Where it was in an order, by the order.
+    courses: Vec<(&'a str, String)>,
     sides: Vec<(String, &'a SideResult, Vec<Found<'a>>)>,
 }
 
@@ -386,16 +390,20 @@ fn html(result: &AuditResult, rules: &Rules) -> askama::Result<String> {
             let why = why.map(|why| format!(" (not judged: {why})")).unwrap_or_default();
             format!("{} {}{why}", vehicle.manufacturer, vehicle.serial_number)
         });
+    let mut vehicles = Vec::new();
+    let mut drawn = 0;
+    for vehicle in told.iter().take(DRAWN) {
+        let mut shown = shown(vehicle, link(vehicle), result);
+        shown.courses = courses(vehicle, &shown.link, COURSES.saturating_sub(drawn))?;
+        drawn += shown.courses.len();
+        vehicles.push(shown);
+    }
     let page = Page {
         title: title(result),
         overview: overview.collect(),
         columns: columns.clone(),
         quiet: quiet.collect(),
-        vehicles: told
-            .iter()
-            .take(DRAWN)
-            .map(|vehicle| shown(vehicle, link(vehicle), result))
-            .collect(),
+        vehicles,
         left_out: told.len().saturating_sub(DRAWN),
         restricted: restricted(result)
             .into_iter()
@@ -405,6 +413,17 @@ fn html(result: &AuditResult, rules: &Rules) -> askama::Result<String> {
         result,
     };
     page.render()
+}
+
+/// Where a vehicle was in orders during which something was found, at most so many.
+fn courses<'a>(vehicle: &'a VehicleResult, link: &str, most: usize) -> askama::Result<Vec<(&'a str, String)>> {
+    let all = vehicle.courses.iter().take(most).enumerate();
+    all.map(|(at, course)| {
+        let id = format!("{link}-course{}", at + 1);
+        let figure = course.figure(&id, "Where the vehicle was, and what it was told", |_| false)?;
+        Ok((course.order.as_str(), figure))
+    })
+    .collect()
 }
 
 fn shown<'a>(vehicle: &'a VehicleResult, link: String, result: &AuditResult) -> Shown<'a> {
@@ -473,86 +492,10 @@ fn shown<'a>(vehicle: &'a VehicleResult, link: String, result: &AuditResult) -> 
                 bars,
             })
             .collect(),
+        courses: Vec::new(),
         sides: sides.collect(),
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::tests::traffic;
-    use super::super::{Audit, Options};
-    use super::*;
-    use tck_pack::Role;
-
-    #[test]
-    fn the_page_shows_each_vehicle_over_time_and_what_a_vehicle_says_is_only_text() {
-        let library = tck_testing::library();
-        let pack = library.rules.packs.latest();
-        let mut messages = traffic(library, pack, Role::Agv, "order-acceptance/", &["horizon-not-reported"]);
-        for message in &mut messages {
-            let text = String::from_utf8_lossy(&message.payload).replace("\"AUTOMATIC\"", "\"<script>AUTO\"");
-            message.payload = text.into_bytes().into();
-        }
-        let mut audit = Audit::new(&library.rules, Options::default()).expect("options");
-        for message in messages {
-            audit.observe(message);
-        }
-        let result = audit.finish(Vec::new());
-        let folder = tempfile::tempdir().expect("folder");
-        let into = folder.path().join("audits/monday");
-        let root = write(&result, &library.rules, &into).expect("written");
-        let found = Manifest::verify(&into).expect("a manifest");
-        assert!(found.holds() && found.root == root, "{found:?}");
-        let read = |name: &str| std::fs::read_to_string(into.join(name)).expect("file");
-        let page = read("report.html");
-        assert!(
-            !page.contains("<script") && (page.contains("&#60;script") || page.contains("&lt;script")),
-            "{page}"
-        );
-        assert!(
-            page.contains("STATE-12") && page.contains("<svg") && page.contains("class=\"connection"),
-            "{page}"
-        );
-        // First the overview, with a link to the vehicle and the sentence of each requirement.
-        let at = |what: &str| page.find(what).unwrap_or(usize::MAX);
-        assert!(at("id=\"overview\"") < at("id=\"requirements\"") && at("id=\"requirements\"") < at("id=\"v0\""));
-        let sentence = &library.rules.catalogue.get("MODE-01").expect("known").text;
-        let sentence = sentence.split([',', '\'', '&']).next().expect("a beginning");
-        assert!(page.contains("href=\"#v0\"") && page.contains(sentence), "{page}");
-        assert!(
-            page.contains("&#34;operatingMode&#34;") || page.contains("&quot;operatingMode&quot;"),
-            "{page}"
-        );
-        assert!(markdown(&result).contains("MODE-01") && !markdown(&result).contains("<script"));
-        let quality: serde_json::Value = serde_json::from_str(&code_quality(&result)).expect("JSON");
-        assert!(
-            quality
-                .as_array()
-                .is_some_and(|all| all.iter().any(|one| one["check_name"] == "STATE-12"))
-        );
-        assert!(sarif(&result, &Sources::default()).contains("STATE-12"));
-        let junit = read("junit.xml");
-        let document = roxmltree::Document::parse(&junit).expect("XML");
-        let failures = document.descendants().filter(|node| node.has_tag_name("failure"));
-        let types: Vec<&str> = failures.filter_map(|node| node.attribute("type")).collect();
-        // A failure for each mistake, by the requirement it is shown as.
-        let sides = result.vehicles.iter().flat_map(|vehicle| &vehicle.sides);
-        let mistakes = sides
-            .flat_map(SideResult::mistakes)
-            .filter(|mistake| mistake.worst.verdict == Verdict::Fail);
-        let mistakes: Vec<Vec<String>> = mistakes
-            .map(|mistake| mistake.requirements.iter().map(ToString::to_string).collect())
-            .collect();
-        let shown: std::collections::BTreeSet<&str> = mistakes.iter().map(|all| all[0].as_str()).collect();
-        assert_eq!(types.iter().copied().collect::<std::collections::BTreeSet<_>>(), shown);
-        for id in ["STATE-12", "MODE-01"] {
-            assert!(mistakes.iter().flatten().any(|known| known == id), "{mistakes:?}");
-        }
-        let value: serde_json::Value = serde_json::from_str(&read("result.json")).expect("JSON");
-        assert!(
-            value["vehicles"][0]["timeLine"]["order"]
-                .as_array()
-                .is_some_and(|spans| !spans.is_empty())
-        );
-    }
-}
+mod tests;

@@ -2,6 +2,7 @@
 //! is missing between two messages, so that nobody is blamed for a hole in the recording.
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use super::AuditContext;
@@ -46,6 +47,12 @@ impl Conversation {
     /// The rules it is judged by; `None` before it is.
     pub fn pack(&self) -> Option<&Pack> {
         self.pack.as_deref()
+    }
+
+    /// Whether something was found at one of these messages.
+    pub fn found_in(&self, messages: &RangeInclusive<u64>) -> bool {
+        let mut all = self.sides.iter().flat_map(|side| side.kept.values());
+        all.any(|known| messages.contains(&known.message))
     }
 
     pub fn sides_mut(&mut self) -> impl Iterator<Item = &mut Side> {

@@ -13,6 +13,7 @@ pub mod bundle;
 mod cases;
 mod continuity;
 mod conversation;
+mod courses;
 mod dedup;
 pub mod export;
 mod finding_group;

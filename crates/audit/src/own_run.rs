@@ -1,8 +1,10 @@
 //! The journal of one of our own runs: judged by all monitors, as the run was, since it holds all they need.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use super::Options;
+use super::courses::Courses;
 use super::result::{FindingResult, SideResult, VehicleResult};
 use super::time_line::TimeLine;
 use tck_base::verdict::Verdict;
@@ -10,7 +12,8 @@ use tck_capture::{Item, Recorded};
 use tck_journal::Entry;
 use tck_journal::event::{Event, Record, RunHeader};
 use tck_judge::{JudgeError, Observed, Rules, TrafficJudge};
-use tck_pack::Role;
+use tck_pack::{Pack, Role};
+use tck_view::Topic;
 
 /// Why the journal of a run cannot be judged.
 #[derive(Debug, thiserror::Error)]
@@ -42,14 +45,11 @@ pub fn own_run(
         TrafficJudge::begin(rules, &header, &|monitor| options.wants_monitor(monitor))?.among_others(&header);
     let mut found: BTreeMap<(String, String, Verdict), FindingResult> = BTreeMap::new();
     let mut messages = BTreeMap::new();
-    let mut keep = |all: Vec<Observed>, at: jiff::Timestamp| {
-        for observed in all {
-            keep(&mut found, observed, recording, at);
-        }
-    };
+    let pack: Option<&Arc<Pack>> = rules.packs.get(&header.protocol);
+    let mut courses = Courses::default();
     let mut last = first.at;
     let mut is_whole = false;
-    keep(judge.observe(&Entry::new(first)), last.utc);
+    keep(&mut found, judge.observe(&Entry::new(first)), recording, last.utc);
     while let Some(item) = recorded.read()? {
         let Item::Record(record) = item else { continue };
         last = record.at;
@@ -57,10 +57,19 @@ pub fn own_run(
             *messages.entry(name).or_default() += 1;
         }
         let ended = matches!(record.event, Event::RunEnded { .. });
-        keep(judge.observe(&Entry::new(*record)), last.utc);
+        let entry = Entry::new(*record);
+        let message = of_vehicle(entry.event(), &header)
+            .zip(pack)
+            .and_then(|(name, pack)| entry.view(Topic::of_name(name), pack.names()));
+        if let Some(message) = message {
+            courses.note(entry.seq(), message, |span| {
+                found.values().any(|known| span.contains(&known.message))
+            });
+        }
+        keep(&mut found, judge.observe(&entry), recording, last.utc);
         is_whole |= ended;
         if ended {
-            keep(judge.finish(last.moment), last.utc);
+            keep(&mut found, judge.finish(last.moment), recording, last.utc);
         }
     }
     let role = if header.role == Role::MasterControl.word() {
@@ -74,6 +83,7 @@ pub fn own_run(
     let side = SideResult::new(role, seen, judged, found.into_values().collect(), decided, Vec::new());
     // What a run that was cut short would have shown nobody knows.
     let side = side.unless((!is_whole).then_some("the journal ends before its run does"));
+    let sides = vec![side];
     Ok(VehicleResult {
         topics: header.topics.get("state").cloned().unwrap_or_default(),
         manufacturer: header.manufacturer,
@@ -87,7 +97,8 @@ pub fn own_run(
         vantage: header.vantage,
         hints: Vec::new(),
         time_line: TimeLine::default(),
-        sides: vec![side],
+        courses: courses.finish(&sides),
+        sides,
     })
 }
 
@@ -101,7 +112,27 @@ fn topic(event: &Event, header: &RunHeader) -> Option<String> {
     all.find(|(_, full)| *full == topic).map(|(name, _)| name.clone())
 }
 
+/// The topic name of a message to or from the vehicle that the run is about.
+fn of_vehicle<'h>(event: &Event, header: &'h RunHeader) -> Option<&'h str> {
+    let (Event::Message { topic, .. } | Event::Sent { topic, .. }) = event else {
+        return None;
+    };
+    let mut topics = header.topics.iter();
+    topics.find(|(_, full)| *full == topic).map(|(name, _)| name.as_str())
+}
+
 fn keep(
+    found: &mut BTreeMap<(String, String, Verdict), FindingResult>,
+    all: Vec<Observed>,
+    recording: usize,
+    at: jiff::Timestamp,
+) {
+    for observed in all {
+        keep_one(found, observed, recording, at);
+    }
+}
+
+fn keep_one(
     found: &mut BTreeMap<(String, String, Verdict), FindingResult>,
     observed: Observed,
     recording: usize,
@@ -132,13 +163,10 @@ fn keep(
 mod tests {
     use super::*;
 
-    /// The journal of a run, as far as its first lines go.
-    fn judged(lines: usize) -> SideResult {
-        let path = concat!(
-            env!("CARGO_MANIFEST_DIR"),
-            "/../../fixtures/journals/refusal-corrected-level/journal.jsonl"
-        );
-        let text = std::fs::read_to_string(path).expect("fixture");
+    /// A journal that is kept, as far as its first lines go.
+    fn vehicle(journal: &str, lines: usize) -> VehicleResult {
+        let journals = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/journals");
+        let text = std::fs::read_to_string(format!("{journals}/{journal}/journal.jsonl")).expect("fixture");
         let some: Vec<&str> = text.lines().take(lines).collect();
         let reader = Box::new(std::io::Cursor::new(some.join("\n")));
         let mut recorded: Recorded = tck_capture::Lines::new(reader, 0, tck_capture::Mapping::default()).into();
@@ -146,8 +174,29 @@ mod tests {
             panic!("no journal");
         };
         let rules = &tck_testing::library().rules;
-        let vehicle = own_run(rules, &Options::default(), 0, *first, &mut recorded).expect("judged");
+        own_run(rules, &Options::default(), 0, *first, &mut recorded).expect("judged")
+    }
+
+    fn judged(lines: usize) -> SideResult {
+        let vehicle = vehicle("refusal-corrected-level", lines);
         vehicle.sides.into_iter().next().expect("a side")
+    }
+
+    #[test]
+    fn the_order_is_drawn_that_the_vehicle_has_and_not_the_one_that_it_refused() {
+        let courses = vehicle("refusal-corrected-references", usize::MAX).courses;
+        let [course] = courses.as_slice() else {
+            panic!("{courses:#?}");
+        };
+        assert_eq!((course.message, course.update), (Some(33), Some(1)));
+        let nodes: Vec<(&str, bool)> = course
+            .nodes
+            .iter()
+            .map(|node| (node.id.as_str(), node.released))
+            .collect();
+        assert_eq!(nodes, [("A1", true), ("A2", true), ("A3", true), ("A4", false)]);
+        assert_eq!(course.trail, [(0.0, 0.0), (0.0, 2.0), (0.0, 4.0)]);
+        assert_eq!((course.found[0].number, course.found[0].place), (47, Some((0.0, 0.0))));
     }
 
     #[test]

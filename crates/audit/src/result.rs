@@ -10,6 +10,7 @@ use tck_base::verdict::{Accumulated, Verdict};
 use tck_capture::{Counted, SourcePosition};
 use tck_journal::event::ShardRecord;
 use tck_pack::Role;
+use tck_report::course::CoursePicture;
 use tck_report::manifest::digest;
 use tck_result::MergedParts;
 
@@ -172,6 +173,9 @@ pub struct VehicleResult {
     /// What it did over time.
     #[serde(default, skip_serializing_if = "TimeLine::is_empty")]
     pub time_line: TimeLine,
+    /// Where it was in orders during which something was found.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub courses: Vec<CoursePicture>,
     /// Its sides.
     pub sides: Vec<SideResult>,
 }

@@ -40,6 +40,7 @@ fn commanding(serial: &str, found: Vec<FindingResult>) -> VehicleResult {
         vantage: String::new(),
         hints: Vec::new(),
         time_line: TimeLine::default(),
+        courses: Vec::new(),
         sides: vec![side],
     }
 }

@@ -114,7 +114,7 @@ pub(super) struct Side {
     sheet: Option<Arc<Entry>>,
     /// Whether there was one.
     had_sheet: bool,
-    kept: BTreeMap<Key, FindingResult>,
+    pub kept: BTreeMap<Key, FindingResult>,
     /// What holds only if nothing turns out to be missing.
     open: VecDeque<Open>,
     /// What was found last: what turns out to be missing later may explain it.

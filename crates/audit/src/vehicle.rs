@@ -2,11 +2,13 @@
 //! the protocol its [`conversation`](super::conversation) is judged.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 use std::time::Duration;
 
 use super::arrived::{Arrived, timestamp, version};
 use super::conversation::{Concluded, Conversation};
+use super::courses::Courses;
 use super::dedup::{Known, Sorted};
 use super::header::header;
 use super::hint::{Hint, Hints};
@@ -71,6 +73,7 @@ pub(super) struct Vehicle {
     first_hand: BTreeMap<String, Option<jiff::Timestamp>>,
     hints: BTreeMap<(String, String), HintResult>,
     time_line: TimeLine,
+    courses: Courses,
     /// Whether its connections were judged.
     wired: bool,
     /// What came out while it spoke another version.
@@ -100,6 +103,7 @@ impl Vehicle {
             first_hand: BTreeMap::new(),
             hints: BTreeMap::new(),
             time_line: TimeLine::default(),
+            courses: Courses::default(),
             wired: false,
             earlier: Vec::new(),
             news: Vec::new(),
@@ -244,6 +248,8 @@ impl Vehicle {
     fn pass(&mut self, arrived: Arrived, scene: AuditContext<'_>) {
         if let Some(message) = arrived.message(self.names(scene)).filter(|_| !arrived.stale) {
             self.time_line.note(message, arrived.at.utc);
+            let found = |messages: &RangeInclusive<u64>| self.conversation.found_in(messages);
+            self.courses.note(arrived.number, message, found);
         }
         if self.is_updated(&arrived, scene) {
             let concluded = self.conclude(scene);
@@ -446,6 +452,7 @@ impl Vehicle {
             vantage: if self.wired { "tap" } else { "subscriber" }.to_owned(),
             hints: std::mem::take(&mut self.hints).into_values().collect(),
             time_line: std::mem::take(&mut self.time_line),
+            courses: std::mem::take(&mut self.courses).finish(&sides),
             sides,
         }
     }

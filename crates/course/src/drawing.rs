@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+use super::picture::{Dot, Line, LineKind, Picture, Room, escaped, head};
 use super::{Edge, Layout, Node};
 
 /// How large a drawing of text is at most, in characters.
@@ -10,9 +11,6 @@ const COLUMNS: usize = 76;
 const ROWS: usize = 24;
 /// A floor with more nodes is not drawn as text: their names would cover each other.
 const NAMED: usize = 60;
-/// How wide a drawing of SVG is, without its border, and how wide the border is.
-const WIDTH: f64 = 900.0;
-const BORDER: f64 = 60.0;
 
 impl Layout {
     /// Each map as text: nodes by their ids, stations in brackets, edges as dots, and below it what can be driven in one
@@ -80,67 +78,52 @@ impl Layout {
         })
     }
 
-    /// All maps below each other as SVG: nodes with their ids, stations as squares, edges as arrows.
+    /// All maps below each other as SVG: nodes with their ids, stations as squares, edges as arrows, curves as curves.
     #[must_use]
     pub fn as_svg(&self) -> String {
+        let room = Room::SHEET;
         let mut body = String::new();
         let mut top = 0.0;
         for map in self.maps() {
-            let nodes: Vec<&Node> = self.nodes().filter(|node| node.map_id == map).collect();
             let _ = writeln!(
                 body,
-                "<text x=\"{BORDER}\" y=\"{:.0}\" class=\"map\">{}</text>",
+                "<text x=\"{}\" y=\"{:.0}\" class=\"map\">{}</text>",
+                room.border,
                 top + 24.0,
                 escaped(map)
             );
-            let bounds = Bounds::of(&nodes);
-            let scale = (WIDTH / bounds.width()).min(WIDTH / bounds.height());
-            let place = |node: &Node| {
-                let x = BORDER + (node.x - bounds.left) * scale;
-                let y = top + BORDER + (bounds.top - node.y) * scale;
-                (x, y)
-            };
-            for edge in self.edges() {
-                let find = |id: &str| nodes.iter().find(|node| node.id == id);
-                let (Some(start), Some(end)) = (find(&edge.start), find(&edge.end)) else {
-                    continue;
-                };
-                let ((x1, y1), (x2, y2)) = (place(start), place(end));
-                let _ = writeln!(
-                    body,
-                    "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" marker-end=\"url(#arrow)\"><title>{}</title></line>",
-                    escaped(&edge.id)
-                );
-            }
-            for node in &nodes {
-                let (x, y) = place(node);
-                let shape = if node.station {
-                    format!(
-                        "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"12\" height=\"12\"/>",
-                        x - 6.0,
-                        y - 6.0
-                    )
-                } else {
-                    format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"6\"/>")
-                };
-                let _ = writeln!(
-                    body,
-                    "{shape}<text x=\"{:.1}\" y=\"{:.1}\">{}</text>",
-                    x + 9.0,
-                    y - 9.0,
-                    escaped(&node.id)
-                );
-            }
-            top += bounds.height() * scale + 2.0 * BORDER;
+            let mut picture = self.picture_of(map);
+            picture.settle();
+            let frame = picture.frame(room, top);
+            body.push_str(&picture.body(&frame, "floor"));
+            top += frame.height;
         }
-        let (width, height) = (WIDTH + 2.0 * BORDER, top.max(1.0));
+        let (width, height) = (room.width + 2.0 * room.border, top.max(1.0));
         format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width:.0} {height:.0}\" font-family=\"sans-serif\" \
-             font-size=\"14\">\n<style>line {{ stroke: #888; stroke-width: 1.5 }} circle {{ fill: #06c }} rect {{ fill: #c60 }} \
-             .map {{ font-weight: bold }}</style>\n<defs><marker id=\"arrow\" viewBox=\"0 0 10 10\" refX=\"14\" refY=\"5\" \
-             markerWidth=\"8\" markerHeight=\"8\" orient=\"auto\"><path d=\"M0 0 10 5 0 10z\" fill=\"#888\"/></marker></defs>\n\
-             {body}</svg>\n"
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"course\" viewBox=\"0 0 {width:.0} {height:.0}\">\n{}{body}</svg>\n",
+            head("floor")
         )
+    }
+
+    /// What lies on one map.
+    fn picture_of(&self, map: &str) -> Picture {
+        let lies_here = |id: &str| self.node(id).is_some_and(|node| node.map_id == map);
+        let lines = self.edges().filter(|edge| lies_here(&edge.start)).map(|edge| Line {
+            kind: LineKind::Edge,
+            points: self.line(edge),
+            name: edge.id.clone(),
+        });
+        let nodes = self.nodes().filter(|node| node.map_id == map).map(|node| Dot {
+            x: node.x,
+            y: node.y,
+            name: node.id.clone(),
+            station: node.station,
+        });
+        Picture {
+            lines: lines.collect(),
+            nodes: nodes.collect(),
+            ..Picture::default()
+        }
     }
 }
 
@@ -224,21 +207,6 @@ fn whole(place: f64, most: usize) -> usize {
     at.min(most)
 }
 
-fn escaped(text: &str) -> String {
-    let mut safe = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => safe.push_str("&amp;"),
-            '<' => safe.push_str("&lt;"),
-            '>' => safe.push_str("&gt;"),
-            '"' => safe.push_str("&quot;"),
-            c if c.is_control() => safe.push(' '),
-            c => safe.push(c),
-        }
-    }
-    safe
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -287,8 +255,8 @@ mod tests {
         let floor = layout(&[("<b>", 0.0, 0.0), ("b&", 3.0, 0.0)], &[("<b>", "b&")]);
         let svg = floor.as_svg();
         let drawn = roxmltree::Document::parse(&svg).expect("XML");
-        let count = |name: &str| drawn.descendants().filter(|one| one.has_tag_name(name)).count();
-        assert_eq!((count("circle"), count("line")), (2, 1));
+        let count = |name: &str| drawn.descendants().filter(|one| one.tag_name().name() == name).count();
+        assert_eq!((count("circle"), count("polyline")), (2, 1));
         assert!(svg.contains("&lt;b&gt;"));
     }
 

@@ -16,8 +16,10 @@ mod graph;
 mod layout;
 mod lif;
 mod outward;
+pub mod picture;
 #[cfg(test)]
 mod tests;
+mod trail;
 mod ways;
 
 use std::collections::BTreeMap;
@@ -27,6 +29,7 @@ use serde_json::{Map, Value};
 pub use demand::Demand;
 pub use fit::{Scope, Taken, Takes, Unheard};
 pub use layout::{BUILT_IN_MAP, BUILT_IN_UPPER_MAP, Edge, Layout, Node, demanded_in_order, told_in_order};
+pub use trail::{GivesUp, Trail};
 pub use ways::Station;
 
 use tck_base::diagnostic::{Diagnostic, Source};

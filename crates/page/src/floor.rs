@@ -1,11 +1,10 @@
 //! The course as a picture: the floor, the order in hand, and where the vehicle is.
 
-use std::collections::VecDeque;
-
 use serde::Serialize;
 
 use super::shown::{EXCERPT, NAME, shown};
 use tck_base::verdict::Verdict;
+use tck_course::GivesUp;
 
 /// How many places of the vehicle its trail has at most.
 const TRAIL: usize = 400;
@@ -13,8 +12,6 @@ const TRAIL: usize = 400;
 const ERRORS: usize = 5;
 /// How many nodes and edges of an order are shown.
 const PARTS: usize = 500;
-/// How far the vehicle has to move before its trail grows, in metres.
-const STRIDE: f64 = 0.05;
 
 /// A floor.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -158,58 +155,26 @@ impl VehicleOnFloor {
     }
 }
 
-/// Where the vehicle was, the oldest place first.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Trail(VecDeque<(f64, f64)>);
+/// Where the vehicle was lately, the oldest place first.
+#[derive(Clone, Debug)]
+pub(crate) struct Trail(tck_course::Trail<()>);
+
+impl Default for Trail {
+    fn default() -> Self {
+        Self(tck_course::Trail::new(TRAIL, GivesUp::Oldest))
+    }
+}
 
 impl Trail {
     /// Goes on with where the vehicle is now.
     pub fn goes_on(&mut self, vehicle: &VehicleOnFloor) {
-        let (Some(x), Some(y)) = (vehicle.x, vehicle.y) else {
-            return;
-        };
-        let is_near = self
-            .0
-            .back()
-            .is_some_and(|(last_x, last_y)| (x - last_x).hypot(y - last_y) < STRIDE);
-        if is_near || !x.is_finite() || !y.is_finite() {
-            return;
+        if let (Some(x), Some(y)) = (vehicle.x, vehicle.y) {
+            self.0.goes_on(x, y, ());
         }
-        if self.0.len() == TRAIL {
-            self.0.pop_front();
-        }
-        self.0.push_back((x, y));
     }
 
     /// All places.
     pub fn places(&self) -> Vec<(f64, f64)> {
-        self.0.iter().copied().collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn at(x: f64) -> VehicleOnFloor {
-        VehicleOnFloor {
-            x: Some(x),
-            y: Some(0.0),
-            ..VehicleOnFloor::default()
-        }
-    }
-
-    #[test]
-    fn a_trail_is_of_places_apart_and_forgets_the_oldest() {
-        let mut trail = Trail::default();
-        for place in [0.0, 0.01, 0.02, 1.0, f64::NAN, f64::INFINITY] {
-            trail.goes_on(&at(place));
-        }
-        trail.goes_on(&VehicleOnFloor::default());
-        assert_eq!(trail.places(), [(0.0, 0.0), (1.0, 0.0)]);
-        for place in 2..=TRAIL {
-            trail.goes_on(&at(place as f64));
-        }
-        assert_eq!((trail.places().len(), trail.places()[0]), (TRAIL, (1.0, 0.0)));
+        self.0.places()
     }
 }

@@ -14,6 +14,7 @@ pub mod cause;
 pub mod certificate;
 pub mod clean;
 pub mod compare;
+pub mod course;
 pub mod coverage;
 pub mod ctrf;
 pub mod cyclonedx;

@@ -2,8 +2,9 @@
 //!
 //! The templates under `templates/report/` hold the words and the layout, [`view`], [`matrix`], [`test_view`] and
 //! [`messages`] prepare what they show. Every value passes [`Escape`]; nothing here marks a text as safe except
-//! the sequence diagrams, which are templates of their own.
+//! the diagrams and the pictures of courses, which are templates of their own and escape what they show.
 
+mod courses;
 mod escape;
 mod evidence;
 mod exploration_view;
@@ -21,6 +22,7 @@ use std::collections::BTreeMap;
 
 use askama::Template;
 
+use courses::Courses;
 pub use escape::Escape;
 use exploration_view::Grid;
 
@@ -62,9 +64,18 @@ fn thinned(
 ) -> Result<String, askama::Error> {
     let anchors = Anchors::of(result);
     let mut gallery = Gallery::new(journal);
-    let tests = test_view::views(result, sources, &anchors, &thinning.of(result), &mut gallery)?;
+    let mut courses = Courses::default();
+    let tests = test_view::views(
+        result,
+        sources,
+        &anchors,
+        &thinning.of(result),
+        &mut gallery,
+        &mut courses,
+    )?;
     let monitors = view::monitors(result, sources, &anchors, &mut gallery);
     let monitor_messages = gallery.take();
+    let monitor_courses = courses.of_monitors(result, &gallery)?;
     let findings = finding_views(result, sources, &anchors, |seq| gallery.shows(seq));
     let shown_tests = tests.iter().filter(|test| !test.not_applicable).count();
     Page {
@@ -102,6 +113,7 @@ fn thinned(
         left_out: thinning.said(),
         monitors,
         monitor_messages,
+        monitor_courses,
         capabilities: &result.capabilities,
         deviations: view::deviations(result, &anchors),
         settings: &result.settings,
@@ -162,6 +174,8 @@ struct Page<'a> {
     not_applicable: bool,
     monitors: Vec<MonitorView>,
     monitor_messages: Vec<MessageView>,
+    /// What was broken, by which monitor, and where the vehicle was.
+    monitor_courses: Vec<(String, String, String)>,
     capabilities: &'a [Capability],
     deviations: Vec<view::Deviation>,
     settings: &'a [Setting],

@@ -1,6 +1,7 @@
 //! One test of the page: what was decided, by which clause and which message, and what happened around it.
 
 use super::Anchors;
+use super::courses::Courses;
 use super::evidence::{choose, marked};
 use super::messages::{Gallery, MessageView};
 use super::source_view::{SourceView, source_view};
@@ -44,6 +45,8 @@ pub struct TestView {
     pub decisions: Vec<DecisionView>,
     pub steps: Vec<StepView>,
     pub source: Option<SourceView>,
+    /// Where the vehicle was, with what it was told.
+    pub course: Option<String>,
     pub diagram: Option<String>,
     pub messages: Vec<MessageView>,
     /// What was left out of the messages.
@@ -115,6 +118,7 @@ pub fn views(
     anchors: &Anchors,
     thinned: &Thinned<'_>,
     gallery: &mut Gallery<'_>,
+    courses: &mut Courses,
 ) -> Result<Vec<TestView>, askama::Error> {
     let mut order: Vec<(usize, &TestResult)> = result.tests.iter().enumerate().collect();
     // What is broken comes first, and takes its evidence first where there is a limit.
@@ -129,7 +133,8 @@ pub fn views(
         } else {
             Evidence::NotDrawn
         };
-        let view = view(at, test, evidence, result, sources, anchors, gallery)?;
+        let mut view = view(at, test, evidence, result, sources, anchors, gallery)?;
+        view.course = courses.of_test(at, test, gallery)?;
         drawn += view.diagram.as_ref().map_or(0, String::len);
         all.push(view);
     }
@@ -273,6 +278,7 @@ fn view(
             })
             .collect(),
         source: source.filter(|_| shown).map(|source| source_view(source, test)),
+        course: None,
         diagram,
         messages: gallery.take(),
         left_out,
