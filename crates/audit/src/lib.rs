@@ -12,6 +12,7 @@ pub mod baseline;
 pub mod bundle;
 mod continuity;
 mod conversation;
+mod covered;
 mod dedup;
 pub mod export;
 mod finding_group;

@@ -9,7 +9,7 @@ use tck_base::verdict::Verdict;
 use tck_capture::{Item, Recorded};
 use tck_journal::Entry;
 use tck_journal::event::{Event, Record, RunHeader};
-use tck_judge::{JudgeError, Observed, Rules, TrafficJudge};
+use tck_judge::{JudgeError, MessageTally, Observed, Rules, TrafficJudge};
 use tck_pack::Role;
 
 /// Why the journal of a run cannot be judged.
@@ -49,6 +49,7 @@ pub fn own_run(
     };
     let mut last = first.at;
     let mut is_whole = false;
+    let mut tally = rules.packs.get(&header.protocol).map(MessageTally::new);
     keep(judge.observe(&Entry::new(first)), last.utc);
     while let Some(item) = recorded.read()? {
         let Item::Record(record) = item else { continue };
@@ -57,7 +58,15 @@ pub fn own_run(
             *messages.entry(name).or_default() += 1;
         }
         let ended = matches!(record.event, Event::RunEnded { .. });
-        keep(judge.observe(&Entry::new(*record)), last.utc);
+        let entry = Entry::new(*record);
+        let name = match entry.event() {
+            Event::Message { topic, .. } | Event::Sent { topic, .. } => named(topic, &header),
+            _ => None,
+        };
+        if let (Some(tally), Some(name), Some(message)) = (&mut tally, name, entry.json()) {
+            tally.note(&name, message);
+        }
+        keep(judge.observe(&entry), last.utc);
         is_whole |= ended;
         if ended {
             keep(judge.finish(last.moment), last.utc);
@@ -87,6 +96,7 @@ pub fn own_run(
         vantage: header.vantage,
         hints: Vec::new(),
         time_line: TimeLine::default(),
+        message_coverage: tally.map(|tally| tally.result().only_missing()),
         sides: vec![side],
     })
 }
@@ -96,9 +106,15 @@ fn topic(event: &Event, header: &RunHeader) -> Option<String> {
     let Event::Message { topic, .. } = event else {
         return None;
     };
+    named(topic, header)
+}
+
+/// The topic name of a full topic of the run.
+fn named(topic: &str, header: &RunHeader) -> Option<String> {
     let of_vehicles = header.vehicles.iter().map(|vehicle| &vehicle.topics);
     let mut all = std::iter::once(&header.topics).chain(of_vehicles).flatten();
-    all.find(|(_, full)| *full == topic).map(|(name, _)| name.clone())
+    all.find(|(_, full)| full.as_str() == topic)
+        .map(|(name, _)| name.clone())
 }
 
 fn keep(

@@ -12,7 +12,7 @@ use tck_capture::{Counted, SourcePosition};
 use tck_journal::event::ShardRecord;
 use tck_pack::Role;
 use tck_report::manifest::digest;
-use tck_result::MergedParts;
+use tck_result::{MergedParts, MessageCoverage};
 
 /// Format of the result of an audit.
 pub const RESULT_FORMAT: &str = "vda5050-tck.audit/1";
@@ -173,6 +173,9 @@ pub struct VehicleResult {
     /// What it did over time.
     #[serde(default, skip_serializing_if = "TimeLine::is_empty")]
     pub time_line: TimeLine,
+    /// What its messages and those to it never had of that which the standard has; absent in results of old.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub message_coverage: Option<MessageCoverage>,
     /// Its sides.
     pub sides: Vec<SideResult>,
 }

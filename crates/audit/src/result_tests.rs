@@ -38,6 +38,7 @@ fn commanding(serial: &str, found: Vec<FindingResult>) -> VehicleResult {
         vantage: String::new(),
         hints: Vec::new(),
         time_line: TimeLine::default(),
+        message_coverage: None,
         sides: vec![side],
     }
 }

@@ -92,6 +92,7 @@ fn part(index: usize, of: usize, verdict: Verdict) -> RunPart {
             capabilities: Vec::new(),
             fleet: None,
             exploration: None,
+            message_coverage: None,
             limits: vec!["Of one part.".to_owned()],
             deviations: BTreeMap::new(),
             settings: Vec::new(),

@@ -16,6 +16,7 @@ mod errata;
 mod fields;
 mod hooks;
 mod hooks_file;
+mod member_tree;
 mod participant;
 mod protocol;
 mod reader;
@@ -33,6 +34,7 @@ pub use catalogue::{Catalogue, Decided, Mood, Requirement, RequirementId, Subjec
 pub use changes::{ChangeKind, RequirementChange};
 pub use errata::KeptReading;
 pub use hooks::{HookChange, HookEffect, HookInfo, HookParameter, HookRisk, HookValue, Hooks};
+pub use member_tree::{MemberNode, MemberTree};
 pub use participant::Participant;
 pub use protocol::{NoPack, Pack, PackError, Packs, TopicName, TopicRule, VersionClaim};
 pub use schema::{Finding, FindingKind, MessageSchema};

@@ -214,6 +214,7 @@ fn case(end: fn() -> End, tests: Vec<TestResult>, around: fn(&mut Case)) -> Case
             capabilities: Vec::new(),
             fleet: None,
             exploration: None,
+            message_coverage: None,
             limits: Vec::new(),
             deviations: BTreeMap::new(),
             settings: Vec::new(),

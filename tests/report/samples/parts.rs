@@ -172,6 +172,7 @@ pub fn run(tests: Vec<TestResult>, monitors: Vec<MonitorResult>) -> RunResult {
         ],
         fleet: None,
         exploration: None,
+        message_coverage: None,
         limits: vec!["Only tests of the group order were selected.".to_owned()],
         deviations: BTreeMap::new(),
         settings: vec![

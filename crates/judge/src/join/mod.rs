@@ -15,7 +15,8 @@ use super::rules::Rules;
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_pack::Role;
 use tck_result::{
-    DeviceIdentity, MergeTrouble, MergedPart, MergedRun, MonitorResult, Part as _, RunResult, TestResult, gathered,
+    DeviceIdentity, MergeTrouble, MergedPart, MergedRun, MessageCoverage, MonitorResult, Part as _, RunResult,
+    TestResult, gathered,
 };
 
 /// Where the evidence of a part is, and what it was when it was joined.
@@ -95,6 +96,9 @@ pub fn join(rules: &Rules, parts: &[RunPart]) -> Result<RunResult, JoinError> {
         joined: Vec::new(),
         shard: None,
         exploration: conversation_coverage::exploration(&rules.suites.tests, &tests, role),
+        message_coverage: results()
+            .filter_map(|one| one.message_coverage.clone())
+            .reduce(MessageCoverage::and),
         fleet: None,
         capabilities: first.result.capabilities.clone(),
         limits: limits(own, &merged),

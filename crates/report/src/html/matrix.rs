@@ -85,6 +85,13 @@ fn disagreement(requirement: &RequirementResult) -> Option<String> {
     (!words.is_empty()).then(|| words.join(", "))
 }
 
+/// What never came without which nothing decides a requirement, where that is known.
+fn never_came(requirement: &RequirementResult, result: &RunResult) -> Option<String> {
+    let mut undecided = result.message_coverage.iter().flat_map(|known| &known.undecided);
+    let found = undecided.find(|one| one.requirements.contains(&requirement.id))?;
+    Some(found.missing())
+}
+
 fn row(
     requirement: &RequirementResult,
     known: Option<&RequirementText>,
@@ -102,7 +109,10 @@ fn row(
         }
         (_, gap) => gap,
     };
-    let reason = reason.map(|why| why.to_string());
+    let reason = reason.map(|why| match never_came(requirement, result) {
+        Some(missing) => format!("{why}; never came: {missing}"),
+        None => why.to_string(),
+    });
     RequirementView {
         anchor: anchors.requirement(&requirement.id).unwrap_or_default(),
         badge: Badge::of_requirement(requirement),

@@ -8,6 +8,7 @@ mod escape;
 mod evidence;
 mod exploration_view;
 mod matrix;
+mod message_coverage_view;
 mod messages;
 mod overview_view;
 mod pretty;
@@ -28,6 +29,7 @@ use super::fleet;
 use super::sources::Sources;
 use super::statement;
 use matrix::ChapterView;
+use message_coverage_view::CoverageView;
 use messages::{Gallery, MessageView};
 use overview_view::{AdviceView, FindingView, advice_views, finding_views};
 use tck_journal::event::Setting;
@@ -95,6 +97,10 @@ fn thinned(
             (None, None) => String::new(),
         },
         exploration: explored(result),
+        coverage: result
+            .message_coverage
+            .as_ref()
+            .map(|coverage| CoverageView::of(coverage, &anchors)),
         chapters: matrix::chapters(result, sources, &anchors),
         not_applicable: tests.iter().any(|test| test.not_applicable),
         tests,
@@ -154,6 +160,7 @@ struct Page<'a> {
     vehicles: Vec<view::VehicleRow>,
     reactions: String,
     exploration: Vec<(&'static str, Grid)>,
+    coverage: Option<CoverageView<'a>>,
     chapters: Vec<ChapterView>,
     tests: Vec<TestView>,
     shown_tests: usize,
