@@ -40,6 +40,9 @@ pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem
     if arguments.certificate {
         return super::export::certificate(folder);
     }
+    if arguments.profile {
+        return super::export::profile(folder);
+    }
     if let Some(number) = arguments.message {
         return message(folder, number, arguments.format);
     }

@@ -38,6 +38,7 @@ mod rejudging;
 mod repeatable;
 mod resuming;
 mod scripted;
+mod seen;
 mod selecting;
 mod sharing;
 mod simulating;

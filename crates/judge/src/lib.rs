@@ -24,6 +24,7 @@ mod message_tally;
 mod monitor;
 mod monitor_set;
 mod never_shown;
+mod on_word;
 mod own_errors;
 mod program;
 mod reactions;

@@ -26,6 +26,8 @@ const ACTION_TYPES: [Field; 3] = [
     ActionState::action_type,
     OfferedAction::action_type,
 ];
+/// Where the vocabulary of a version has the status of an action that was done.
+const FINISHED: &str = "actionStatus.finished";
 
 /// Which members, words and action types of the messages of one version came by.
 #[derive(Clone, Debug)]
@@ -46,8 +48,10 @@ struct TopicTally {
     words: Vec<Counter>,
     /// Where the words of each member begin.
     begin: Vec<u32>,
-    /// The members that say which action it is.
-    action_types: Vec<usize>,
+    /// The objects that are an action, with the name of the member that says which it is.
+    actions: Vec<(usize, String)>,
+    /// The member that says how far an action is, and the word for one that was done.
+    finished: Option<(String, String)>,
     messages: u32,
     others: BTreeSet<String>,
 }
@@ -73,7 +77,8 @@ impl TopicTally {
     fn of(schema: &MessageSchema, pack: &Pack) -> Self {
         let nodes = schema.tree().nodes();
         let names = ACTION_TYPES.map(|field| pack.names().name(field));
-        let is_type = |name: &str| names.contains(&Some(name));
+        let actions = nodes.iter().filter(|node| names.contains(&Some(node.name.as_str())));
+        let status = pack.names().name(ActionState::action_status);
         let mut begin = Vec::with_capacity(nodes.len());
         let mut words = 0_u32;
         for node in nodes {
@@ -84,19 +89,24 @@ impl TopicTally {
             members: vec![Counter::default(); nodes.len()],
             words: vec![Counter::default(); words as usize],
             begin,
-            action_types: (0..nodes.len()).filter(|at| is_type(&nodes[*at].name)).collect(),
+            actions: actions
+                .filter_map(|node| Some((node.parent?, node.name.clone())))
+                .collect(),
+            finished: status
+                .zip(pack.word(FINISHED))
+                .map(|(member, word)| (member.to_owned(), word.to_owned())),
             messages: 0,
             others: BTreeSet::new(),
             schema: schema.clone(),
         }
     }
 
-    /// Counts a message; gives the action types in it.
-    fn note<'m>(&mut self, message: &'m Value) -> BTreeSet<&'m str> {
+    /// Counts a message; gives the action types in it, and whether one of the type was done.
+    fn note<'m>(&mut self, message: &'m Value) -> BTreeMap<&'m str, bool> {
         self.messages = self.messages.saturating_add(1);
         let schema = self.schema.clone();
         let tree = schema.tree();
-        let mut actions = BTreeSet::new();
+        let mut actions = BTreeMap::new();
         let mut waiting: Vec<(usize, &'m Value)> = vec![(0, message)];
         let mut left = VALUES;
         while let Some((at, value)) = waiting.pop() {
@@ -110,6 +120,13 @@ impl TopicTally {
             self.members[at].count(self.messages);
             match value {
                 Value::Object(members) => {
+                    let own = self.actions.iter().find(|(object, _)| *object == at);
+                    if let Some(action) = own.and_then(|(_, name)| members.get(name)?.as_str()) {
+                        let done = self.finished.as_ref().is_some_and(|(member, word)| {
+                            members.get(member).and_then(Value::as_str) == Some(word.as_str())
+                        });
+                        *actions.entry(action).or_default() |= done;
+                    }
                     for (name, member) in members {
                         match tree.child(at, name) {
                             Some(child) => waiting.push((child, member)),
@@ -127,9 +144,6 @@ impl TopicTally {
                     let words = &tree.nodes()[at].words;
                     if let Some(word) = words.iter().position(|word| word == text) {
                         self.words[self.begin[at] as usize + word].count(self.messages);
-                    }
-                    if self.action_types.contains(&at) {
-                        actions.insert(text.as_str());
                     }
                 }
                 _ => {}
@@ -200,7 +214,7 @@ impl MessageTally {
             return;
         };
         let kind = Topic::of_name(topic);
-        for action in tally.note(message) {
+        for (action, done) in tally.note(message) {
             let name = cut(action);
             if !self.actions.contains_key(name) {
                 if self.actions.len() >= ACTIONS {
@@ -216,6 +230,7 @@ impl MessageTally {
                 kind if kind.is_to_vehicle() => &mut known.sent,
                 _ => &mut known.reported,
             } += 1;
+            known.finished += u64::from(done);
         }
     }
 
@@ -343,6 +358,10 @@ mod tests {
         let coverage = tally(&[
             ("order", json!({ "nodes": [{ "actions": pick }] })),
             ("state", json!({ "actionStates": pick })),
+            (
+                "state",
+                json!({ "actionStates": [{ "actionType": "pick", "actionStatus": "FINISHED" }] }),
+            ),
             ("factsheet", json!({ "protocolFeatures": { "agvActions": own } })),
         ])
         .result();

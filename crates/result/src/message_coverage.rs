@@ -70,6 +70,8 @@ pub struct ActionCoverage {
     pub sent: u64,
     /// In how many messages of a vehicle it came.
     pub reported: u64,
+    /// In how many of them it was done.
+    pub finished: u64,
 }
 
 /// What is undecided because something never came.
@@ -168,6 +170,14 @@ impl MessageCoverage {
         self.topics.iter().find(|topic| topic.topic == name)
     }
 
+    /// The actions that a vehicle has done and that no factsheet of it declares, where one came.
+    pub fn undeclared(&self) -> impl Iterator<Item = &ActionCoverage> {
+        let mut declared = self.actions.iter().map(|action| action.declared);
+        let has_list = declared.any(|count| count > 0);
+        let all = self.actions.iter();
+        all.filter(move |action| has_list && action.finished > 0 && action.declared == 0)
+    }
+
     /// What never came, without what did: of many vehicles that is all there is room for.
     #[must_use]
     pub fn only_missing(mut self) -> Self {
@@ -202,6 +212,7 @@ impl MessageCoverage {
                     known.declared += action.declared;
                     known.sent += action.sent;
                     known.reported += action.reported;
+                    known.finished += action.finished;
                 }
                 None => self.actions.push(action),
             }

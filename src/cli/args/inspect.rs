@@ -170,10 +170,13 @@ pub struct Report {
     /// Print an in-toto statement about the bundle, ready to be signed
     #[arg(long, conflicts_with_all = ["verify", "rejudge", "certificate"])]
     pub attestation: bool,
+    /// Print the profile of the run, for `run --profile`: every setting that is no default, and no secret
+    #[arg(long, conflicts_with_all = ["verify", "rejudge", "certificate", "attestation", "message", "compare", "merge"])]
+    pub profile: bool,
     /// Print it for a pipeline, or write it into a file, as junit, junit-requirements, markdown, code-quality or sarif; may be
     /// repeated
     #[arg(long = "as", value_name = "KIND[=FILE]", value_parser = rendering::to_file_or_stdout,
-        conflicts_with_all = ["verify", "rejudge", "certificate", "attestation", "compare"])]
+        conflicts_with_all = ["verify", "rejudge", "certificate", "attestation", "profile", "compare"])]
     pub renderings: Vec<RenderedTo>,
     /// How JUnit XML shows what was not decided
     #[arg(long, value_name = "HOW", value_enum, default_value_t)]

@@ -9,8 +9,9 @@ use vda5050_tck::pack::Role;
 use vda5050_tck::report::sources::{ClauseSource, HowDecided, MonitorSource, RequirementText, Sources, TestSource};
 use vda5050_tck::result::{
     ActionCoverage, Answers, Capability, Decision, DeviceIdentity, ExplorationResult, MemberCoverage, MemberResult,
-    MessageCoverage, MonitorFinding, MonitorResult, NearestMiss, NeverShown, NotDecided, ProgramEnd, ProgramResult,
-    RequirementResult, RunResult, SaidResult, StepResult, TestResult, TopicCoverage, Unseen, Waited,
+    MessageCoverage, MonitorFinding, MonitorResult, NearestMiss, NeverShown, NotDecided, OnWord, ProgramEnd,
+    ProgramResult, RequirementResult, RunResult, SaidResult, StepResult, TestResult, TopicCoverage, Unseen, Waited,
+    WordKind,
 };
 use vda5050_tck::verdict::Verdict;
 
@@ -207,6 +208,11 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
         }],
         exploration: Some(explored()),
         message_coverage: Some(shown()),
+        on_word: vec![OnWord {
+            test: evil(),
+            kind: WordKind::Answer,
+            what: evil(),
+        }],
         program: Some(ProgramResult {
             starts: 2,
             ends: u64::MAX,

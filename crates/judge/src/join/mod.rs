@@ -99,6 +99,7 @@ pub fn join(rules: &Rules, parts: &[RunPart]) -> Result<RunResult, JoinError> {
         message_coverage: results()
             .filter_map(|one| one.message_coverage.clone())
             .reduce(MessageCoverage::and),
+        on_word: results().flat_map(|one| one.on_word.clone()).collect(),
         fleet: None,
         capabilities: first.result.capabilities.clone(),
         limits: limits(own, &merged),

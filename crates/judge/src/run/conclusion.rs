@@ -8,6 +8,7 @@ use super::super::decide::mood;
 use super::super::merge;
 use super::super::monitor_set::MonitorReport;
 use super::super::never_shown;
+use super::super::on_word::claimed;
 use super::super::requirement_verdict::RequirementVerdict;
 use super::RunJudge;
 use tck_base::pattern::Bindings;
@@ -16,8 +17,8 @@ use tck_journal::Reason;
 use tck_journal::event::Gate;
 use tck_pack::Decided;
 use tck_result::{
-    Capability, Decision, DeviceIdentity, MessageCoverage, NotDecided, ProgramResult, RequirementResult, RunResult,
-    TestResult,
+    Capability, Decision, DeviceIdentity, MessageCoverage, NotDecided, OnWord, ProgramResult, RequirementResult,
+    RunResult, TestResult,
 };
 use tck_suite::model::{Monitor, Test};
 
@@ -126,6 +127,7 @@ impl RunJudge {
                 .collect(),
             fleet,
             message_coverage: None,
+            on_word: self.on_word(),
             limits,
             deviations: self.plan.deviations.clone(),
             settings: header.settings.clone(),
@@ -134,6 +136,19 @@ impl RunJudge {
         let all = result.verdict.into_iter().chain(unknown).chain(result.aside());
         result.verdict = all.collect::<Accumulated>().get();
         result
+    }
+
+    /// What rests on a person's word, in this run and in the one before it.
+    fn on_word(&self) -> Vec<OnWord> {
+        let mut all = self.earlier.as_ref().map_or_else(Vec::new, |earlier| earlier.on_word());
+        let tests = self.done.iter().filter_map(|done| self.test(&done.id));
+        let claims = tests.flat_map(|test| claimed(&test, &self.plan.capabilities));
+        for one in self.answers.said().iter().cloned().chain(claims) {
+            if !all.contains(&one) {
+                all.push(one);
+            }
+        }
+        all
     }
 
     /// Which members, words and action types came by, and what is undecided because something never did.

@@ -21,6 +21,7 @@ use super::delivery::DeliveryEvidence;
 use super::hidden::Hidden;
 use super::message_tally::MessageTally;
 use super::monitor_set::MonitorSet;
+use super::on_word::Answers;
 use super::program;
 use super::reactions::Reactions;
 use super::repair::mended;
@@ -65,6 +66,8 @@ pub struct RunJudge {
     reactions: Reactions,
     /// Which members and words came by, in this run and in those before it.
     messages: MessageTally,
+    /// What a person has said.
+    answers: Answers,
     /// The instant actions the harness has sent: type by id.
     instants: BTreeMap<String, String>,
     last_order: Option<(Moment, String)>,
@@ -109,6 +112,7 @@ impl RunJudge {
             rules: rules.clone(),
             timeline,
             messages: MessageTally::new(&ground.pack),
+            answers: Answers::default(),
             header,
             role,
             ground,
@@ -194,6 +198,9 @@ impl RunJudge {
                 self.watches.finish(entry.at().moment, &self.ground);
             }
             _ => {}
+        }
+        if let Some(test) = self.current.as_ref().map(|current| current.result().id.as_str()) {
+            self.answers.observe(entry, test);
         }
         if let Some(current) = &mut self.current {
             if matches!(entry.event(), Event::TestEnded { .. }) {

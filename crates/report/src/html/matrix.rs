@@ -33,6 +33,8 @@ pub struct RequirementView {
     pub deciders: Vec<(String, Option<String>)>,
     /// Every verdict and how many gave it, where they disagree.
     pub verdicts: Option<String>,
+    /// Whether a test that decided it rests on a person's word.
+    pub on_word: bool,
     /// In which of the parts that were joined.
     pub parts: Option<String>,
     /// Why nothing decided it.
@@ -134,6 +136,11 @@ fn row(
             .map(|id| (id.clone(), anchors.decider(id)))
             .collect(),
         verdicts: disagreement(requirement),
+        on_word: requirement.verdict.is_some()
+            && result
+                .on_word
+                .iter()
+                .any(|one| requirement.decided_by.contains(&one.test)),
         parts: in_parts(requirement),
         gap: reason.or_else(|| requirement.verdict.is_none().then(|| "no reason given".to_owned())),
         interpretation: known.and_then(|known| known.interpretation.clone()),

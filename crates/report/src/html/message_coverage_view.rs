@@ -11,6 +11,8 @@ pub struct CoverageView<'a> {
     pub topics: Vec<TopicView<'a>>,
     pub actions: &'a [ActionCoverage],
     pub undecided: Vec<UndecidedRow<'a>>,
+    /// The actions that were done and are declared in no factsheet.
+    pub undeclared: Vec<&'a str>,
 }
 
 /// The messages of a topic.
@@ -53,6 +55,7 @@ impl<'a> CoverageView<'a> {
         Self {
             topics: coverage.topics.iter().map(TopicView::of).collect(),
             actions: &coverage.actions,
+            undeclared: coverage.undeclared().map(|known| known.action.as_str()).collect(),
             undecided: undecided.collect(),
         }
     }
