@@ -34,14 +34,14 @@ pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem
     if arguments.verify {
         return verify(folder, arguments);
     }
+    if arguments.profile {
+        return super::export::profile(folder);
+    }
     if saved::is_audit(folder) {
         return super::audited::report(folder, arguments, outputs);
     }
     if arguments.certificate {
         return super::export::certificate(folder);
-    }
-    if arguments.profile {
-        return super::export::profile(folder);
     }
     if let Some(number) = arguments.message {
         return message(folder, number, arguments.format);

@@ -49,12 +49,13 @@ fn answer(test: &str, what: String) -> OnWord {
 /// What a test needs and only the profile claims.
 pub(super) fn claimed(test: &Test, capabilities: &[Capability]) -> Vec<OnWord> {
     let claims = |name: &str| {
-        let is_listed = |known: &&Capability| {
+        let is_of = |known: &Capability| {
             let rest = known.name.strip_prefix(name);
-            known.source != PROFILE && rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
+            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
         };
-        let is_claimed = |known: &&Capability| known.name == name && known.source == PROFILE && known.value == YES;
-        capabilities.iter().any(|known| is_claimed(&known)) && !capabilities.iter().any(|known| is_listed(&known))
+        let mut own = capabilities.iter().filter(|known| is_of(known));
+        let is_listed = own.clone().any(|known| known.source != PROFILE);
+        !is_listed && own.any(|known| known.name == name && known.value == YES)
     };
     let needed = test.needs.iter().filter_map(|need| match need {
         Need::Action { name, scope } => {
