@@ -38,7 +38,7 @@ pub fn of_monitors(
     for monitor in on_duty {
         for binding in &monitor.checks {
             let id = binding.requirement.as_str();
-            if mood(&rules.catalogue, pack, id).is_none() || !is_open(monitor, id) {
+            if !is_open(monitor, id) || mood(&rules.catalogue, pack, id).is_none() {
                 continue;
             }
             let missing = of_monitor(monitor, id, rules, tally, bindings);
