@@ -247,3 +247,73 @@ fn wants(pattern: &Pattern) -> bool {
         _ => true,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    /// What came by, and what the version calls things.
+    fn tally(messages: &[(&str, Value)]) -> (MessageTally, Bindings) {
+        let pack = tck_testing::library().rules.packs.latest();
+        let mut tally = MessageTally::new(pack);
+        for (topic, message) in messages {
+            tally.note(topic, message);
+        }
+        let bindings = Bindings::above(vec![pack.words()]);
+        (tally, bindings)
+    }
+
+    /// What never came, by requirement.
+    fn missing(requirement: &str, messages: &[(&str, Value)]) -> BTreeSet<String> {
+        let (tally, bindings) = tally(messages);
+        let is_open = |_: &Monitor, id: &str| id == requirement;
+        let rules = &tck_testing::library().rules;
+        let all = of_monitors(rules, Role::Agv, &tally, &bindings, &is_open);
+        assert!(all.iter().all(|one| one.requirements == [requirement]));
+        all.iter()
+            .flat_map(|one| one.missing.iter().map(ToString::to_string))
+            .collect()
+    }
+
+    #[test]
+    fn a_monitor_says_what_never_came_from_the_topic_down_to_the_member() {
+        let about = "FACT-10";
+        assert_eq!(
+            missing(about, &[]),
+            BTreeSet::from(["any message on factsheet".to_owned()])
+        );
+        let bare = missing(about, &[("factsheet", json!({ "headerId": 1 }))]);
+        assert!(bare.contains("/vehicleConfig of factsheet"), "{bare:?}");
+        let whole = json!({ "vehicleConfig": { "network": { "localIpAddress": "10.0.0.1" } } });
+        assert_eq!(missing(about, &[("factsheet", whole)]), BTreeSet::new());
+    }
+
+    #[test]
+    fn a_test_that_stopped_says_which_word_its_step_never_saw() {
+        let mode = "modes/reported[teach-in]";
+        let tests = &tck_testing::library().rules.suites.tests;
+        let test = tests.iter().find(|test| test.id == mode).expect("the test");
+        let stopped = |outcome: &str, messages: &[(&str, Value)]| {
+            let result = json!({ "id": mode, "title": "", "verdict": "inconclusive", "seconds": 0.0, "maturity": "reviewed",
+                "journal": null,
+                "decisions": [{ "requirement": "MODE-01", "verdict": "inconclusive", "clause": "steps[2].checks", "place": "",
+                    "message": "" }],
+                "steps": [{ "path": "steps[2]", "verb": "expect: state", "place": "", "outcome": outcome, "seconds": 0.0 }] });
+            let result: TestResult = serde_json::from_value(result).expect("a result");
+            let (tally, bindings) = tally(messages);
+            of_test(test, &result, &tally, &bindings).map(|one| (one.requirements.join(" "), one.missing()))
+        };
+        let automatic = || ("state", json!({ "operatingMode": "AUTOMATIC" }));
+        let said = stopped("failed", &[automatic()]);
+        let expected = ("MODE-01".to_owned(), "TEACHIN as /operatingMode of state".to_owned());
+        assert_eq!(said, Some(expected));
+        assert_eq!(stopped("done", &[automatic()]), None);
+        let taught = ("state", json!({ "operatingMode": "TEACHIN" }));
+        assert_eq!(
+            stopped("failed", &[automatic(), taught]),
+            None,
+            "it came, and the test stopped for another reason"
+        );
+    }
+}
