@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::args::{AccessArgs, Discover, Format, Init, ListenArgs};
 use super::exit::Exit;
@@ -16,7 +16,11 @@ use tck_net::bench::endpoint::{Access, Credentials, Endpoint};
 use tck_net::bench::tls::TlsFiles;
 use tck_pack::{Packs, Role};
 use tck_profile as profile;
+use tck_result::MessageCoverage;
 use tck_run::{Device, Heard, Wishes, draft, draft_master_control, listen};
+
+/// How many members that never came are named of a topic.
+const NAMED: usize = 6;
 
 /// `discover`.
 pub fn discover(arguments: &Discover) -> Result<Exit, Problem> {
@@ -24,13 +28,25 @@ pub fn discover(arguments: &Discover) -> Result<Exit, Problem> {
     let heard = hear(&arguments.listen, &library)?;
     let devices = heard.devices();
     match arguments.format {
-        Format::Json => super::print(&format!(
-            "{:#}\n",
-            json!({ "format": "vda5050-tck.discovery/1", "devices": devices, "otherMessages": heard.others })
-        ))?,
+        Format::Json => {
+            let devices = devices.iter().map(|device| {
+                let mut described = json!(device);
+                described["messageCoverage"] = json!(heard.coverage(device));
+                described
+            });
+            let devices: Vec<Value> = devices.collect();
+            super::print(&format!(
+                "{:#}\n",
+                json!({ "format": "vda5050-tck.discovery/1", "devices": devices, "otherMessages": heard.others })
+            ))?
+        }
         Format::Text => {
             let packs = &library.rules.packs;
-            let mut text: String = devices.iter().map(|device| describe(device, packs)).collect();
+            let described = devices.iter().map(|device| {
+                let covered = heard.coverage(device).as_ref().map(covered).unwrap_or_default();
+                format!("{}{covered}\n", describe(device, packs))
+            });
+            let mut text: String = described.collect();
             if heard.others > 0 {
                 let _ = writeln!(text, "{} messages of no device were heard as well", heard.others);
             }
@@ -83,7 +99,7 @@ pub fn init(arguments: &Init) -> Result<Exit, Problem> {
         ));
     }
     super::print(&format!(
-        "{}{shown} is written; next: vda5050-tck run --profile {shown} --plan\n",
+        "{}\n{shown} is written; next: vda5050-tck run --profile {shown} --plan\n",
         describe(device, &library.rules.packs)
     ))
 }
@@ -264,6 +280,24 @@ fn describe(device: &Device, packs: &Packs) -> String {
     for remark in &device.remarks {
         let _ = writeln!(text, "  remark     {}", escaped(remark));
     }
-    text.push('\n');
+    text
+}
+
+/// How much of the standard the messages of a device had, for people: of each topic that came, with the first members that did
+/// not.
+fn covered(coverage: &MessageCoverage) -> String {
+    let mut text = String::new();
+    for topic in coverage.topics.iter().filter(|topic| topic.messages > 0) {
+        let _ = write!(text, "  members    {}: {} of {}", topic.topic, topic.shown, topic.of);
+        let never = topic.never();
+        let named: Vec<&str> = never.iter().take(NAMED).map(|one| one.member.as_str()).collect();
+        if !named.is_empty() {
+            let _ = write!(text, "; never {}", named.join(", "));
+        }
+        if never.len() > NAMED {
+            let _ = write!(text, " and {} more", never.len() - NAMED);
+        }
+        text.push('\n');
+    }
     text
 }

@@ -9,6 +9,7 @@ use super::exit::Exit;
 use super::outputs::{Content, Outputs, Shown};
 use super::problem::Problem;
 use tck_base::diagnostic::Diagnostic;
+use tck_journal::Event;
 use tck_journal::file::{self, Recording};
 use tck_judge as judge;
 use tck_judge::Library;
@@ -35,6 +36,35 @@ pub fn certificate(folder: &Path) -> Result<Exit, Problem> {
         }
     })?;
     super::print(&page)
+}
+
+/// Prints the profile of a run, without what may be secret.
+pub fn profile(folder: &Path) -> Result<Exit, Problem> {
+    let recorded = file::read(&file::find(folder)).ok().and_then(|recording| {
+        let first = recording.journal.entries().first()?;
+        match first.event() {
+            Event::RunBegun { header } => Some(header.settings.clone()),
+            _ => None,
+        }
+    });
+    let settings = match recorded {
+        Some(settings) => settings,
+        // Parts that were joined have a journal each, and their settings in common.
+        None => {
+            json::read(&folder.join("result.json"))
+                .map_err(|error| Problem::from(Diagnostic::whole("result", error.to_string())))?
+                .settings
+        }
+    };
+    let Some(text) = tck_profile::written(&settings) else {
+        let title = format!(
+            "there is no profile in {}: nothing was set but defaults, or an earlier version of this program made the run",
+            folder.display()
+        );
+        let hint = "`vda5050-tck init` writes a profile from what a device shows";
+        return Err(Diagnostic::whole("profile", title).hint(hint).into());
+    };
+    super::print(&text)
 }
 
 /// Prints an in-toto statement about the bundle of a run.

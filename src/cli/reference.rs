@@ -119,10 +119,5 @@ pub(super) fn settings(asked: &Asked<'_>) -> Vec<Setting> {
         ("built-in.vehicle", vehicle.unwrap_or_default()),
     ];
     let all = all.into_iter().filter(|(_, value)| !value.is_empty());
-    all.map(|(name, value)| Setting {
-        name: name.to_owned(),
-        value,
-        origin: "flag".to_owned(),
-    })
-    .collect()
+    all.map(|(name, value)| Setting::shown(name, value, "flag")).collect()
 }

@@ -35,6 +35,9 @@ pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem
     if arguments.verify {
         return verify(folder, arguments);
     }
+    if arguments.profile {
+        return super::export::profile(folder);
+    }
     if saved::is_audit(folder) {
         return super::audited::report(folder, arguments, outputs);
     }

@@ -21,6 +21,9 @@ fn a_vehicle_is_found_and_its_profile_leads_to_a_plan() {
     assert_eq!(device["manufacturer"], MANUFACTURER);
     assert_eq!(device["serialNumber"], SERIAL);
     assert!(device["messages"]["connection"].as_u64().unwrap() > 0, "{found}");
+    let topics = device["messageCoverage"]["topics"].as_array().unwrap();
+    let connection = topics.iter().find(|topic| topic["topic"] == "connection").unwrap();
+    assert!(connection["shown"].as_u64().unwrap() > 0, "{connection}");
     bench
         .run(&[&["init", "--serial", SERIAL], &listen[..]].concat())
         .code(0)

@@ -43,6 +43,7 @@ mod repeatable;
 mod resuming;
 mod scheduled;
 mod scripted;
+mod seen;
 mod selecting;
 mod sharing;
 mod simulating;

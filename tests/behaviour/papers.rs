@@ -33,11 +33,7 @@ pub fn certified_within(folder: &Path, budget: Option<Duration>) {
         ("tester", "A. Person"),
         ("firmware-version", "4.2.1"),
     ]
-    .map(|(name, value)| Setting {
-        name: format!("certificate.{name}"),
-        value: value.to_owned(),
-        origin: "device.toml".to_owned(),
-    })
+    .map(|(name, value)| Setting::shown(format!("certificate.{name}"), value, "device.toml"))
     .to_vec();
     let finished = run_silently(&library, &pack, request).unwrap();
     let bundle = Bundle::open(folder);

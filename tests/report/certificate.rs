@@ -4,7 +4,8 @@ use roxmltree::{Document, ParsingOptions};
 use serde_json::Value;
 use vda5050_tck::report::attestation::Attestation;
 use vda5050_tck::report::certificate::{CertificateError, render};
-use vda5050_tck::result::{CERTIFY, RunResult};
+use vda5050_tck::report::html;
+use vda5050_tck::result::{CERTIFY, OnWord, RunResult, WordKind};
 use vda5050_tck::verdict::Verdict;
 
 use crate::samples;
@@ -43,6 +44,28 @@ fn a_certificate_says_who_tested_what_with_which_outcome() {
     ] {
         assert!(body.contains(wanted), "{wanted}");
     }
+}
+
+#[test]
+fn what_rests_on_a_persons_word_is_marked_on_paper_and_page() {
+    let (result, journal) = samples::pass();
+    let mut result = certified(result);
+    let test = result.tests[0].id.clone();
+    result.on_word = vec![OnWord {
+        test: test.clone(),
+        kind: WordKind::Answer,
+        what: "Press the <button>.".to_owned(),
+    }];
+    let paper = render(&result, &samples::sources(), ROOT).expect("a certificate");
+    let page = html::render(&result, &samples::sources(), Some(&journal)).expect("a page");
+    for shown in [&paper, &page] {
+        assert!(shown.contains("1 test rests on a person"), "the limits name it");
+        assert!(shown.contains("Press the &#60;button&#62;."), "{shown}");
+    }
+    assert!(paper.contains("On a person's word") && page.contains("on a person's word:"));
+    result.on_word.clear();
+    let paper = render(&result, &samples::sources(), ROOT).expect("a certificate");
+    assert!(!paper.contains("person's word"));
 }
 
 #[test]

@@ -14,6 +14,7 @@ mod cases;
 mod continuity;
 mod conversation;
 mod courses;
+mod covered;
 mod dedup;
 pub mod export;
 mod finding_group;

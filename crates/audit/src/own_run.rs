@@ -11,7 +11,7 @@ use tck_base::verdict::Verdict;
 use tck_capture::{Item, Recorded};
 use tck_journal::Entry;
 use tck_journal::event::{Event, Record, RunHeader};
-use tck_judge::{JudgeError, Observed, Rules, TrafficJudge};
+use tck_judge::{JudgeError, MessageTally, Observed, Rules, TrafficJudge};
 use tck_pack::{Pack, Role};
 use tck_view::Topic;
 
@@ -49,6 +49,7 @@ pub fn own_run(
     let mut courses = Courses::default();
     let mut last = first.at;
     let mut is_whole = false;
+    let mut tally = pack.map(MessageTally::new);
     keep(&mut found, judge.observe(&Entry::new(first)), recording, last.utc);
     while let Some(item) = recorded.read()? {
         let Item::Record(record) = item else { continue };
@@ -65,6 +66,13 @@ pub fn own_run(
             courses.note(entry.seq(), message, |span| {
                 found.values().any(|known| span.contains(&known.message))
             });
+        }
+        let name = match entry.event() {
+            Event::Message { topic, .. } | Event::Sent { topic, .. } => named(topic, &header),
+            _ => None,
+        };
+        if let (Some(tally), Some(name), Some(message)) = (&mut tally, name, entry.json()) {
+            tally.note(&name, message);
         }
         keep(&mut found, judge.observe(&entry), recording, last.utc);
         is_whole |= ended;
@@ -97,6 +105,7 @@ pub fn own_run(
         vantage: header.vantage,
         hints: Vec::new(),
         time_line: TimeLine::default(),
+        message_coverage: tally.map(|tally| tally.result().only_missing()),
         courses: courses.finish(&sides),
         sides,
     })
@@ -107,9 +116,15 @@ fn topic(event: &Event, header: &RunHeader) -> Option<String> {
     let Event::Message { topic, .. } = event else {
         return None;
     };
+    named(topic, header)
+}
+
+/// The topic name of a full topic of the run.
+fn named(topic: &str, header: &RunHeader) -> Option<String> {
     let of_vehicles = header.vehicles.iter().map(|vehicle| &vehicle.topics);
     let mut all = std::iter::once(&header.topics).chain(of_vehicles).flatten();
-    all.find(|(_, full)| *full == topic).map(|(name, _)| name.clone())
+    all.find(|(_, full)| full.as_str() == topic)
+        .map(|(name, _)| name.clone())
 }
 
 /// The topic name of a message to or from the vehicle that the run is about.

@@ -12,7 +12,7 @@ use tck_journal::event::ShardRecord;
 use tck_pack::Role;
 use tck_report::course::CoursePicture;
 use tck_report::manifest::digest;
-use tck_result::MergedParts;
+use tck_result::{MergedParts, MessageCoverage};
 
 /// Format of the result of an audit.
 pub const RESULT_FORMAT: &str = "vda5050-tck.audit/1";
@@ -176,6 +176,9 @@ pub struct VehicleResult {
     /// Where it was in orders during which something was found.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub courses: Vec<CoursePicture>,
+    /// What its messages and those to it never had of that which the standard has; absent in results of old.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub message_coverage: Option<MessageCoverage>,
     /// Its sides.
     pub sides: Vec<SideResult>,
 }

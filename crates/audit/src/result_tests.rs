@@ -41,6 +41,7 @@ fn commanding(serial: &str, found: Vec<FindingResult>) -> VehicleResult {
         hints: Vec::new(),
         time_line: TimeLine::default(),
         courses: Vec::new(),
+        message_coverage: None,
         sides: vec![side],
     }
 }

@@ -9,6 +9,7 @@ use std::time::Duration;
 use super::arrived::{Arrived, timestamp, version};
 use super::conversation::{Concluded, Conversation};
 use super::courses::Courses;
+use super::covered::covered;
 use super::dedup::{Known, Sorted};
 use super::header::header;
 use super::hint::{Hint, Hints};
@@ -23,6 +24,7 @@ use tck_base::clock::{Moment, Stamp};
 use tck_capture::Message;
 use tck_journal::event::{Event, Record, RunHeader, Source};
 use tck_journal::{Entry, Payload};
+use tck_judge::MessageTally;
 use tck_pack::{Pack, Role, VersionClaim};
 use tck_view::{MessageView, Names, Topic};
 
@@ -74,6 +76,8 @@ pub(super) struct Vehicle {
     hints: BTreeMap<(String, String), HintResult>,
     time_line: TimeLine,
     courses: Courses,
+    /// Which members and words came by, once its version is known.
+    tally: Option<MessageTally>,
     /// Whether its connections were judged.
     wired: bool,
     /// What came out while it spoke another version.
@@ -104,6 +108,7 @@ impl Vehicle {
             hints: BTreeMap::new(),
             time_line: TimeLine::default(),
             courses: Courses::default(),
+            tally: None,
             wired: false,
             earlier: Vec::new(),
             news: Vec::new(),
@@ -329,6 +334,7 @@ impl Vehicle {
         self.identify(pack.names());
         let roles = [Role::Agv, Role::MasterControl];
         let sides = roles.map(|role| Side::begin(role, self.header(role, &pack), begun, self.timed, scene));
+        self.tally = Some(MessageTally::new(&pack));
         self.conversation.begin(pack, sides.into_iter().flatten().collect());
         for arrived in std::mem::take(&mut self.waiting) {
             self.show(&arrived, scene);
@@ -337,6 +343,9 @@ impl Vehicle {
 
     fn show(&mut self, arrived: &Arrived, scene: AuditContext<'_>) {
         self.look(arrived, scene);
+        if let (Some(tally), Some(message)) = (&mut self.tally, arrived.entry.json()) {
+            tally.note(&arrived.name, message);
+        }
         self.conversation.show(arrived, scene);
     }
 
@@ -453,6 +462,7 @@ impl Vehicle {
             hints: std::mem::take(&mut self.hints).into_values().collect(),
             time_line: std::mem::take(&mut self.time_line),
             courses: std::mem::take(&mut self.courses).finish(&sides),
+            message_coverage: self.tally.take().map(|tally| covered(&tally, &sides, scene)),
             sides,
         }
     }

@@ -17,6 +17,31 @@ pub struct Setting {
     pub value: String,
     /// `flag`, `environment`, a file name, or `default`.
     pub origin: String,
+    /// How a profile writes it; absent of a default, and of what may hold a secret.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub written: Option<String>,
+}
+
+impl Setting {
+    /// The origin of a value that nobody has set.
+    pub const DEFAULT: &str = "default";
+
+    /// A value of which nothing more is known than how it is shown.
+    #[must_use]
+    pub fn shown(name: impl Into<String>, value: impl Into<String>, origin: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            value: value.into(),
+            origin: origin.into(),
+            written: None,
+        }
+    }
+
+    /// Whether nobody has set it.
+    #[must_use]
+    pub fn is_default(&self) -> bool {
+        self.origin == Self::DEFAULT
+    }
 }
 
 /// Name and version of this program.

@@ -95,6 +95,8 @@ fn part(index: usize, of: usize, verdict: Verdict) -> RunPart {
             capabilities: Vec::new(),
             fleet: None,
             exploration: None,
+            message_coverage: None,
+            on_word: Vec::new(),
             limits: vec!["Of one part.".to_owned()],
             deviations: BTreeMap::new(),
             settings: Vec::new(),
@@ -196,11 +198,7 @@ fn what_is_missing_not_finished_there_twice_or_of_something_else_is_named_and_le
             one.device.series_name = None;
         },
         |one| {
-            one.settings.push(Setting {
-                name: "time.react".to_owned(),
-                value: "9".to_owned(),
-                origin: "flag".to_owned(),
-            });
+            one.settings.push(Setting::shown("time.react", "9", "flag"));
         },
         |one| one.shard = None,
         |one| {
@@ -227,11 +225,8 @@ fn what_is_missing_not_finished_there_twice_or_of_something_else_is_named_and_le
 fn devices_of_one_kind_may_share_a_run_and_are_named() {
     let mut second = part(2, 2, Verdict::Pass);
     second.result.device.serial_number = "2".to_owned();
-    second.result.settings.push(Setting {
-        name: "bench.listen".to_owned(),
-        value: "0.0.0.0:1883".to_owned(),
-        origin: "flag".to_owned(),
-    });
+    let listen = Setting::shown("bench.listen", "0.0.0.0:1883", "flag");
+    second.result.settings.push(listen);
     let whole = joined(&[part(1, 2, Verdict::Pass), second.clone()]);
     assert_eq!((kinds(&whole), whole.verdict), (Vec::new(), Some(Verdict::Pass)));
     assert!(

@@ -17,6 +17,7 @@ mod errata;
 mod fields;
 mod hooks;
 mod hooks_file;
+mod member_tree;
 mod participant;
 mod protocol;
 mod reader;
@@ -35,6 +36,7 @@ pub use catalogue::{Catalogue, Decided, Mood, Requirement, RequirementId, Subjec
 pub use changes::{ChangeKind, RequirementChange};
 pub use errata::KeptReading;
 pub use hooks::{HookChange, HookEffect, HookInfo, HookParameter, HookRisk, HookValue, Hooks};
+pub use member_tree::{MemberNode, MemberTree};
 pub use participant::Participant;
 pub use protocol::{NoPack, Pack, PackError, Packs, TopicName, TopicRule, VersionClaim};
 pub use schema::{Finding, FindingKind, MessageSchema};

@@ -4,7 +4,7 @@
 
 use std::collections::HashSet;
 use std::fmt;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use jsonschema::ValidationError;
 use jsonschema::error::{TypeKind, ValidationErrorKind};
@@ -12,6 +12,7 @@ use serde_json::Value;
 
 use super::Shape;
 use super::errata::{Disputed, KeptReading};
+use super::member_tree::MemberTree;
 use super::validator::{Validator, bounded};
 
 /// At most this many findings per message.
@@ -25,6 +26,7 @@ struct Compiled {
     raw: Value,
     validator: Validator,
     errata: Vec<Disputed>,
+    tree: OnceLock<MemberTree>,
 }
 
 /// One place where a message breaks its schema.
@@ -64,6 +66,7 @@ impl MessageSchema {
             raw,
             validator,
             errata: Vec::new(),
+            tree: OnceLock::new(),
         })))
     }
 
@@ -122,6 +125,12 @@ impl MessageSchema {
     #[must_use]
     pub fn members(&self, path: &[&str]) -> Vec<String> {
         super::shape::members(&self.0.raw, path)
+    }
+
+    /// The members that a message can have, as a tree that is made once.
+    #[must_use]
+    pub fn tree(&self) -> &MemberTree {
+        self.0.tree.get_or_init(|| MemberTree::of(&self.0.raw))
     }
 
     /// Every way to break one member of a message that is right.

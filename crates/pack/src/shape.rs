@@ -129,7 +129,7 @@ pub(super) fn kinds(here: &[&Value]) -> Vec<&'static str> {
         .collect()
 }
 
-fn literals(here: &[&Value]) -> Option<Vec<String>> {
+pub(super) fn literals(here: &[&Value]) -> Option<Vec<String>> {
     let words = here.iter().find_map(|part| part.get("enum")?.as_array())?;
     Some(words.iter().filter_map(Value::as_str).map(str::to_owned).collect())
 }

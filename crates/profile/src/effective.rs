@@ -5,8 +5,9 @@ use std::path::PathBuf;
 
 use super::hook_action::{Hook, HookAction};
 use super::key::{KEYS, SAMPLE_ACTIONS, STATEMENTS};
-use super::layer::Layer;
+use super::layer::{Layer, Origin};
 use super::value::Value;
+use super::written;
 use super::{
     Bench, Claim, Device, Layout, LayoutSource, Motion, PasswordSource, Profile, SampleAction, SampleActions, Setting,
     TimeLimits, VehicleGroup, Vehicles,
@@ -54,6 +55,11 @@ pub(super) fn effective(layer: &Layer, hooks: &Hooks) -> Result<Effective, Vec<D
         settings,
         spans,
     })
+}
+
+/// What is no default is written down with the run.
+fn made(origin: &Origin) -> Option<()> {
+    (*origin != Origin::Default).then_some(())
 }
 
 /// The merged layer, read by name.
@@ -260,6 +266,10 @@ impl Taken<'_> {
                     name: key.path.to_owned(),
                     value: setter.value.shown(),
                     origin: setter.origin.to_string(),
+                    written: made(&setter.origin).and_then(|()| {
+                        let name = key.path.split('.').next_back()?;
+                        written::line(name, &setter.value)
+                    }),
                 })
             })
             .collect();
@@ -268,6 +278,7 @@ impl Taken<'_> {
                 name: "layout.nodes".to_owned(),
                 value: format!("{} nodes, {} edges", list.nodes.len(), list.edges.len()),
                 origin: origin.to_string(),
+                written: made(origin).map(|()| written::layout(list)),
             });
         }
         if let Some((others, origin)) = &self.layer.others {
@@ -284,17 +295,20 @@ impl Taken<'_> {
                 name: "vehicles.others".to_owned(),
                 value: groups.collect::<Vec<_>>().join("; "),
                 origin: origin.to_string(),
+                written: made(origin).map(|()| written::others(others)),
             });
         }
         settings.extend(self.layer.deviations.iter().map(|(deviation, origin)| Setting {
             name: format!("deviations.{}", deviation.requirement),
             value: deviation.reason.clone(),
             origin: origin.to_string(),
+            written: Some(written::deviation(deviation.requirement.as_str(), &deviation.reason)),
         }));
         settings.extend(self.layer.known.iter().map(|(known, origin)| Setting {
             name: format!("known.{}", known.id),
             value: format!("{} (until {})", known.reason, known.until),
             origin: origin.to_string(),
+            written: Some(written::known(&known.id, &known.reason, &known.until)),
         }));
         settings.extend(self.layer.issue_keys.iter().map(|(id, (key, origin))| Setting {
             name: format!("keys.{id}"),
@@ -316,6 +330,7 @@ impl Taken<'_> {
                 }
                 .to_owned(),
                 origin: origin.to_string(),
+                written: written::hook(name, hook),
             }
         }));
         settings

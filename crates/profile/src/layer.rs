@@ -20,7 +20,7 @@ pub(super) enum Origin {
 impl std::fmt::Display for Origin {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
-            Self::Default => "default",
+            Self::Default => super::Setting::DEFAULT,
             Self::File(name) => name,
             Self::Environment => "environment",
             Self::Flag => "flag",

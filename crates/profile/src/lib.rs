@@ -24,6 +24,7 @@ mod surroundings;
 mod tests;
 mod value;
 mod vehicle;
+mod written;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -48,6 +49,7 @@ use tck_base::time;
 pub use tck_base::time::{Contract, TimeLimits, WILL_UNKNOWN, parse as parse_duration, show as show_duration};
 pub use tck_journal::event::Setting;
 pub use vehicle::{VEHICLE_WORDS, VehicleEffect, VehicleWord, find as find_vehicle_word};
+pub use written::profile as written;
 
 use tck_base::diagnostic::Span;
 use tck_pack::{RequirementId, Role};

@@ -500,3 +500,49 @@ fn passwords_come_from_environment_or_file_and_are_never_shown() {
     );
     assert!(secret(&PasswordSource::File("/nowhere".into()), &site).is_err());
 }
+
+#[test]
+fn a_profile_that_is_written_down_from_a_run_is_the_same_profile() {
+    let shown = |effective: &Effective| {
+        let made = effective.settings.iter().filter(|setting| !setting.is_default());
+        let made = made.map(|setting| (setting.name.clone(), setting.value.clone(), setting.written.clone()));
+        made.collect::<BTreeSet<_>>()
+    };
+    let mut written_down = 0;
+    for file in fixtures("good") {
+        let before = checked(&file).unwrap_or_else(|wrong| panic!("{}: {}", file.display(), wrong[0]));
+        let Some(text) = written(&before.settings) else {
+            continue;
+        };
+        // Files are named from where the run was started, and the profile lies in another folder.
+        let again = check(&Source::new("again.toml", text.clone()), Path::new(""), hooks());
+        let again = again.unwrap_or_else(|wrong| panic!("{}: {}\n{text}", file.display(), wrong[0]));
+        let missing: BTreeSet<_> = shown(&before).difference(&shown(&again)).cloned().collect();
+        let is_secret = |name: &str| text.contains(&format!("# {name} is not written here"));
+        let lost: Vec<_> = missing.iter().filter(|(name, ..)| !is_secret(name)).collect();
+        assert!(lost.is_empty(), "{}: {lost:?}\n{text}", file.display());
+        written_down += 1;
+    }
+    assert!(written_down >= 4, "{written_down}");
+}
+
+#[test]
+fn what_may_be_secret_is_named_and_not_written() {
+    let effective = check_text(
+        "[device]\nmanufacturer = \"ACME\"\nserial-number = \"1\"\nlong-action = { type = \"wait\", parameters = { seconds = 2.5, deep = { a = [1, true] } } }\n\
+         [time]\nreact = \"4 s\"\n[deviations]\nMQTT-04 = \"stops \\\"first\\\"\"\n\
+         [hooks.power-cycle]\nrun = [\"./power\", \"--token\", \"abc-secret\"]\n\
+         [hooks.emergency-stop]\nprompt = \"Press it.\"\ntimeout = \"20 s\"\n",
+    )
+    .unwrap_or_else(|wrong| panic!("{}", wrong[0]));
+    let text = written(&effective.settings).expect("a profile");
+    assert!(!text.contains("abc-secret") && !text.contains("./power"), "{text}");
+    assert!(text.contains("# hooks.power-cycle is not written here"), "{text}");
+    let again = check_text(&text).unwrap_or_else(|wrong| panic!("{}\n{text}", wrong[0]));
+    assert_eq!(again.profile.hooks["emergency-stop"].timeout.as_secs(), 20);
+    assert_eq!(again.profile.time.react.as_secs(), 4);
+    assert_eq!(again.profile.deviations[0].reason, "stops \"first\"");
+    let (before, after) = (effective.profile.device, again.profile.device);
+    assert_eq!(before.sample_actions, after.sample_actions);
+    assert!(written(&check_text("").expect("defaults").settings).is_none());
+}

@@ -3,9 +3,14 @@
 //! Terminal and HTML say the same words because both take them from here. The sentence never claims more
 //! than was decided: a pass speaks of the requirements that were decided and names how many were not.
 
+use std::collections::BTreeSet;
+
 use super::clean::line;
 use tck_base::verdict::Verdict;
 use tck_result::{NotDecided, ProgramResult, RequirementResult, RunResult, TestResult};
+
+/// How many tests that rest on a person's word are named.
+const ON_WORD: usize = 4;
 
 /// How many of something got which verdict.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -419,6 +424,26 @@ pub fn trouble(result: &RunResult) -> Option<String> {
     }
 }
 
+/// Which tests rest on a person's word, in one sentence; nothing when none does.
+fn resting_on_word(result: &RunResult) -> Option<String> {
+    let tests: BTreeSet<&str> = result.on_word.iter().map(|one| one.test.as_str()).collect();
+    let more = match tests.len().saturating_sub(ON_WORD) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    let verb = match tests.len() {
+        0 => return None,
+        1 => "rests",
+        _ => "rest",
+    };
+    let count = many(tests.len(), "test");
+    let named: Vec<&str> = tests.into_iter().take(ON_WORD).collect();
+    let named = line(&named.join(", ")).into_owned();
+    Some(format!(
+        "{count} {verb} on a person's word, which no message shows (answers to prompts, claims of the profile): {named}{more}."
+    ))
+}
+
 /// What restricts the statement, one sentence each: what follows from the result itself, then what the run
 /// noted. Clean, but not escaped for a format.
 #[must_use]
@@ -454,6 +479,7 @@ pub fn limits(result: &RunResult) -> Vec<String> {
             _ => format!("{tests} with a finding are on the watchlist: what they hold true is disputed."),
         });
     }
+    all.extend(resting_on_word(result));
     for limit in &result.limits {
         let limit = line(limit).into_owned();
         if !all.contains(&limit) {

@@ -4,7 +4,9 @@
 
 mod exploration;
 mod merged;
+mod message_coverage;
 mod not_decided;
+mod on_word;
 mod parts;
 mod program;
 mod sent;
@@ -15,7 +17,9 @@ use serde::{Deserialize, Serialize};
 
 pub use self::exploration::{Answers, ExplorationResult, MemberResult, SaidResult};
 pub use self::merged::{MergeTrouble, MergedBundle, MergedPart, MergedParts, MergedRun, TroubleKind};
+pub use self::message_coverage::{ActionCoverage, MemberCoverage, MessageCoverage, NeverShown, TopicCoverage, Unseen};
 pub use self::not_decided::NotDecided;
+pub use self::on_word::{OnWord, WordKind};
 pub use self::parts::{Gathered, Part, gathered, most_common};
 pub use self::program::{ProgramEnd, ProgramResult};
 pub use self::sent::{Sent, SentMember};
@@ -90,6 +94,12 @@ pub struct RunResult {
     /// What came of conversations; absent when no test is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exploration: Option<ExplorationResult>,
+    /// Which members, words and action types of the standard came by, and which never did; absent in results of old.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub message_coverage: Option<MessageCoverage>,
+    /// What rests on a person's word.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub on_word: Vec<OnWord>,
     /// What restricts this statement, one sentence each.
     pub limits: Vec<String>,
     /// Declared deviations of the profile: requirement id to reason.

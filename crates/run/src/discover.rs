@@ -4,6 +4,7 @@
 //! wants to look at before a run.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 use serde::Serialize;
@@ -11,9 +12,11 @@ use serde_json::Value;
 
 use super::sheet::Sheet;
 use tck_journal::json::Parsed;
+use tck_judge::MessageTally;
 use tck_net::bench::client::{Client, ClientEvent, ClientOptions};
 use tck_net::bench::endpoint::Endpoint;
 use tck_pack::{Pack, Packs};
+use tck_result::MessageCoverage;
 use tck_view::{Header, Member, MessageView, Topic};
 
 /// How many devices are told apart; a broker with more is shown in parts.
@@ -67,10 +70,15 @@ pub struct Position {
     pub map_id: String,
 }
 
+/// Prefix, manufacturer and serial number of the topics of a device.
+type Key = (String, String, String);
+
 /// Everything that was heard.
 #[derive(Debug, Default)]
 pub struct Heard {
-    devices: BTreeMap<(String, String, String), Device>,
+    devices: BTreeMap<Key, Device>,
+    /// What the messages of each device had, by the version that it speaks.
+    tallies: BTreeMap<Key, MessageTally>,
     /// How many messages were of no device.
     pub others: u64,
 }
@@ -87,7 +95,7 @@ impl Heard {
             self.others = self.others.saturating_add(1);
             return;
         }
-        let device = self.devices.entry(key).or_insert_with(|| Device {
+        let device = self.devices.entry(key.clone()).or_insert_with(|| Device {
             manufacturer: manufacturer.to_owned(),
             serial_number: serial.to_owned(),
             prefix: prefix.to_owned(),
@@ -103,6 +111,25 @@ impl Heard {
             return;
         };
         device.read(name, message, packs);
+        let pack = device.pack(packs);
+        let tally = self.tallies.entry(key).or_insert_with(|| MessageTally::new(pack));
+        if tally.pack().version != pack.version {
+            *tally = MessageTally::new(pack);
+        }
+        tally.note(name, message);
+    }
+
+    /// Which members and words of the standard the messages of a device had, without those that came: what nobody has seen.
+    #[must_use]
+    pub fn coverage(&self, device: &Device) -> Option<MessageCoverage> {
+        let Device {
+            prefix,
+            manufacturer,
+            serial_number,
+            ..
+        } = device;
+        let key = (prefix.clone(), manufacturer.clone(), serial_number.clone());
+        Some(self.tallies.get(&key)?.result().only_missing())
     }
 
     /// The devices, by manufacturer and serial number.
@@ -118,7 +145,7 @@ impl Heard {
 
 impl Device {
     /// The pack of its version; the latest one where it names none that is known.
-    fn pack<'p>(&self, packs: &'p Packs) -> &'p Pack {
+    fn pack<'p>(&self, packs: &'p Packs) -> &'p Arc<Pack> {
         let own = self.version.as_deref().and_then(|version| packs.get(version));
         own.unwrap_or_else(|| packs.latest())
     }
@@ -298,6 +325,25 @@ mod tests {
             remarks.contains("serialNumber is \"2\", and \"0002\" in the topic"),
             "{remarks}"
         );
+    }
+
+    #[test]
+    fn what_a_device_never_showed_is_known_for_its_version() {
+        let heard = heard(&[(
+            "a/v2/M/S/state",
+            json!({ "version": "2.0.0", "operatingMode": "AUTOMATIC", "driving": true }),
+        )]);
+        let coverage = heard.coverage(heard.devices()[0]).expect("a coverage");
+        let state = coverage.topic("state").expect("a topic");
+        assert_eq!((state.messages, state.shown), (1, 3));
+        let never: Vec<&str> = state.never().iter().map(|one| one.member.as_str()).collect();
+        assert!(
+            never.contains(&"/batteryState") && !never.contains(&"/driving"),
+            "{never:?}"
+        );
+        // What only a later version has is not missed.
+        assert!(!never.contains(&"/maps"), "{never:?}");
+        assert!(state.unseen_words().any(|word| word == ("/operatingMode", "MANUAL")));
     }
 
     #[test]

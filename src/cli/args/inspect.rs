@@ -174,10 +174,13 @@ pub struct Report {
     /// Print an in-toto statement about the bundle, ready to be signed
     #[arg(long, conflicts_with_all = ["verify", "rejudge", "certificate"])]
     pub attestation: bool,
+    /// Print the profile of the run, for `run --profile`: every setting that is no default, and no secret
+    #[arg(long, conflicts_with_all = ["verify", "rejudge", "certificate", "attestation", "message", "compare", "merge"])]
+    pub profile: bool,
     /// Print it for others' tools, or write it into a file: junit, junit-requirements, junit-properties, ctrf, allure, markdown,
     /// code-quality, sarif, cyclonedx or svr; may be repeated (docs/handover.md)
     #[arg(long = "as", value_name = "KIND[=FILE]", value_parser = rendering::to_file_or_stdout,
-        conflicts_with_all = ["verify", "rejudge", "certificate", "attestation", "compare"])]
+        conflicts_with_all = ["verify", "rejudge", "certificate", "attestation", "profile", "compare"])]
     pub renderings: Vec<RenderedTo>,
     /// Take keys of test management for junit-properties from this file, too
     #[arg(long, value_name = "FILE", requires = "renderings")]

@@ -214,6 +214,8 @@ fn case(end: fn() -> End, tests: Vec<TestResult>, around: fn(&mut Case)) -> Case
             capabilities: Vec::new(),
             fleet: None,
             exploration: None,
+            message_coverage: None,
+            on_word: Vec::new(),
             limits: Vec::new(),
             deviations: BTreeMap::new(),
             settings: Vec::new(),

@@ -8,9 +8,10 @@ use vda5050_tck::journal::{Direction, Event, Journal, Packet, Payload};
 use vda5050_tck::pack::Role;
 use vda5050_tck::report::sources::{ClauseSource, HowDecided, MonitorSource, RequirementText, Sources, TestSource};
 use vda5050_tck::result::{
-    Answers, Capability, Decision, DeviceIdentity, ExplorationResult, MemberResult, MonitorFinding, MonitorResult,
-    NearestMiss, NotDecided, ProgramEnd, ProgramResult, RequirementResult, RunResult, SaidResult, StepResult,
-    TestResult, Waited,
+    ActionCoverage, Answers, Capability, Decision, DeviceIdentity, ExplorationResult, MemberCoverage, MemberResult,
+    MessageCoverage, MonitorFinding, MonitorResult, NearestMiss, NeverShown, NotDecided, OnWord, ProgramEnd,
+    ProgramResult, RequirementResult, RunResult, SaidResult, StepResult, TestResult, TopicCoverage, Unseen, Waited,
+    WordKind,
 };
 use vda5050_tck::verdict::Verdict;
 
@@ -206,6 +207,12 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
             source: evil(),
         }],
         exploration: Some(explored()),
+        message_coverage: Some(shown()),
+        on_word: vec![OnWord {
+            test: evil(),
+            kind: WordKind::Answer,
+            what: evil(),
+        }],
         program: Some(ProgramResult {
             starts: 2,
             ends: u64::MAX,
@@ -284,6 +291,42 @@ fn explored() -> ExplorationResult {
             member: HOSTILE.to_owned(),
             way: HOSTILE.to_owned(),
             answers,
+        }],
+    }
+}
+
+/// Messages whose members, words and action types are hostile.
+fn shown() -> MessageCoverage {
+    let evil = || HOSTILE.to_owned();
+    let member = |name: String, messages: u64| MemberCoverage {
+        member: name,
+        mandatory: true,
+        messages,
+        words: BTreeMap::from([(evil(), 0)]),
+    };
+    MessageCoverage {
+        topics: vec![TopicCoverage {
+            topic: evil(),
+            publisher: "agv".to_owned(),
+            messages: u64::MAX,
+            shown: 1,
+            of: 2,
+            members: vec![member(evil(), 0), member(format!("/{HOSTILE}"), 1)],
+            others: vec![evil()],
+        }],
+        actions: vec![ActionCoverage {
+            action: evil(),
+            declared: u64::MAX,
+            ..ActionCoverage::default()
+        }],
+        undecided: vec![NeverShown {
+            by: evil(),
+            requirements: vec![evil()],
+            missing: vec![Unseen {
+                topic: evil(),
+                member: Some(evil()),
+                word: Some(evil()),
+            }],
         }],
     }
 }

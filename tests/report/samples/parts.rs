@@ -68,11 +68,7 @@ pub fn test(id: &str, title: &str, verdict: Verdict, seconds: f64, decisions: Ve
 }
 
 pub fn setting(name: &str, value: &str, origin: &str) -> Setting {
-    Setting {
-        name: name.to_owned(),
-        value: value.to_owned(),
-        origin: origin.to_owned(),
-    }
+    Setting::shown(name, value, origin)
 }
 
 pub fn capability(name: &str, value: &str, source: &str) -> Capability {
@@ -172,6 +168,8 @@ pub fn run(tests: Vec<TestResult>, monitors: Vec<MonitorResult>) -> RunResult {
         ],
         fleet: None,
         exploration: None,
+        message_coverage: None,
+        on_word: Vec::new(),
         limits: vec!["Only tests of the group order were selected.".to_owned()],
         deviations: BTreeMap::new(),
         settings: vec![

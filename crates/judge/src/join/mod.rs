@@ -17,7 +17,8 @@ use tck_base::verdict::{Accumulated, Verdict};
 use tck_journal::event::{DIVIDED_TESTS, DIVIDED_VEHICLES};
 use tck_pack::Role;
 use tck_result::{
-    DeviceIdentity, MergeTrouble, MergedPart, MergedRun, MonitorResult, Part as _, RunResult, TestResult, gathered,
+    DeviceIdentity, MergeTrouble, MergedPart, MergedRun, MessageCoverage, MonitorResult, Part as _, RunResult,
+    TestResult, gathered,
 };
 
 /// Where the evidence of a part is, and what it was when it was joined.
@@ -97,6 +98,10 @@ pub fn join(rules: &Rules, parts: &[RunPart]) -> Result<RunResult, JoinError> {
         joined: Vec::new(),
         shard: None,
         exploration: conversation_coverage::exploration(&rules.suites.tests, &tests, role),
+        message_coverage: results()
+            .filter_map(|one| one.message_coverage.clone())
+            .reduce(MessageCoverage::and),
+        on_word: results().flat_map(|one| one.on_word.clone()).collect(),
         fleet: fleet::fleet(own),
         capabilities: first.result.capabilities.clone(),
         limits: limits(own, &merged),

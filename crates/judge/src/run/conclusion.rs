@@ -1,22 +1,26 @@
 //! What came out of a run: tests, requirements and the verdict over all, as they stand at any time.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::super::conversation_coverage;
 use super::super::decide::mood;
 use super::super::merge;
 use super::super::monitor_set::MonitorReport;
+use super::super::never_shown;
+use super::super::on_word::claimed;
 use super::super::requirement_verdict::RequirementVerdict;
 use super::RunJudge;
+use tck_base::pattern::Bindings;
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_journal::Reason;
 use tck_journal::event::Gate;
 use tck_pack::Decided;
 use tck_result::{
-    Capability, Decision, DeviceIdentity, NotDecided, ProgramResult, RequirementResult, RunResult, TestResult,
+    Capability, Decision, DeviceIdentity, MessageCoverage, NotDecided, OnWord, ProgramResult, RequirementResult,
+    RunResult, TestResult,
 };
-use tck_suite::model::Test;
+use tck_suite::model::{Monitor, Test};
 
 /// What restricts a run whose connections cannot be traced to the program that it has started.
 const UNTRACED: &str = "Whether it was the program of `device.command` that was judged is not known here: only on Linux, and at \
@@ -122,13 +126,50 @@ impl RunJudge {
                 })
                 .collect(),
             fleet,
+            message_coverage: None,
+            on_word: self.on_word(),
             limits,
             deviations: self.plan.deviations.clone(),
             settings: header.settings.clone(),
         };
+        result.message_coverage = Some(self.message_coverage(&result));
         let all = result.verdict.into_iter().chain(unknown).chain(result.aside());
         result.verdict = all.collect::<Accumulated>().get();
         result
+    }
+
+    /// What rests on a person's word, in this run and in the one before it.
+    fn on_word(&self) -> Vec<OnWord> {
+        let mut all = self.earlier.as_ref().map_or_else(Vec::new, |earlier| earlier.on_word());
+        let tests = self.done.iter().filter_map(|done| self.test(&done.id));
+        let claims = tests.flat_map(|test| claimed(&test, &self.plan.capabilities));
+        for one in self.answers.said().iter().cloned().chain(claims) {
+            if !all.contains(&one) {
+                all.push(one);
+            }
+        }
+        all
+    }
+
+    /// Which members, words and action types came by, and what is undecided because something never did.
+    fn message_coverage(&self, result: &RunResult) -> MessageCoverage {
+        let mut coverage = self.messages.result();
+        let bindings = Bindings::above(vec![self.ground.pack.words(), Arc::clone(&self.ground.bindings)]);
+        let open: BTreeSet<&str> = result
+            .requirements
+            .iter()
+            .filter(|one| one.not_decided == Some(NotDecided::NothingCame))
+            .map(|one| one.id.as_str())
+            .collect();
+        let tests = result.tests.iter().filter_map(|one| {
+            let test = self.test(&one.id)?;
+            never_shown::of_test(&test, one, &self.messages, &bindings)
+        });
+        coverage.undecided = tests.collect();
+        let is_open = |_: &Monitor, id: &str| open.contains(id);
+        let monitors = never_shown::of_monitors(&self.rules, self.role, &self.messages, &bindings, &is_open);
+        coverage.undecided.extend(monitors);
+        coverage
     }
 
     /// What became of the program that was started, in this run and in the one before it.

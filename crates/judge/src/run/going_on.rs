@@ -36,6 +36,7 @@ impl RunJudge {
         if facts(&self.header) != facts(&next.header) {
             return Err(JudgeError::AnotherRun);
         }
+        next.messages = self.messages.clone();
         next.earlier = Some(Box::new(self));
         Ok(next)
     }

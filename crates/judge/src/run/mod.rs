@@ -19,14 +19,16 @@ pub use going_on::{judge, judged};
 use super::clients::{Attribution, ClientClassifier};
 use super::delivery::DeliveryEvidence;
 use super::hidden::Hidden;
+use super::message_tally::MessageTally;
 use super::monitor_set::MonitorSet;
+use super::on_word::Answers;
 use super::program;
 use super::reactions::Reactions;
 use super::repair::mended;
 use super::rules::{JudgeError, Rules};
 use super::run_contexts::{Ground, RunContexts};
 use super::test::TestJudge;
-use super::timeline::Timeline;
+use super::timeline::{Timeline, TopicOwner};
 use tck_base::clock::{Moment, Stamp};
 use tck_base::verdict::Verdict;
 use tck_journal::Entry;
@@ -62,6 +64,10 @@ pub struct RunJudge {
     /// Whether the last entry was left out.
     left_out: bool,
     reactions: Reactions,
+    /// Which members and words came by, in this run and in those before it.
+    messages: MessageTally,
+    /// What a person has said.
+    answers: Answers,
     /// The instant actions the harness has sent: type by id.
     instants: BTreeMap<String, String>,
     last_order: Option<(Moment, String)>,
@@ -105,6 +111,8 @@ impl RunJudge {
         Ok(Self {
             rules: rules.clone(),
             timeline,
+            messages: MessageTally::new(&ground.pack),
+            answers: Answers::default(),
             header,
             role,
             ground,
@@ -152,6 +160,9 @@ impl RunJudge {
         let subject = self.timeline.add(entry);
         if let Some(place) = self.timeline.place(entry) {
             self.reactions.observe(entry, place);
+            if let (true, Some(message)) = (self.is_counted(entry, place), entry.json()) {
+                self.messages.note(&place.name, message);
+            }
         }
         self.watches
             .observe(entry, subject.as_deref(), &self.timeline, &self.ground);
@@ -187,6 +198,9 @@ impl RunJudge {
                 self.watches.finish(entry.at().moment, &self.ground);
             }
             _ => {}
+        }
+        if let Some(test) = self.current.as_ref().map(|current| current.result().id.as_str()) {
+            self.answers.observe(entry, test);
         }
         if let Some(current) = &mut self.current {
             if matches!(entry.event(), Event::TestEnded { .. }) {
@@ -237,6 +251,15 @@ impl RunJudge {
                 false
             }
         }
+    }
+
+    /// Whether a record is a message that counts for the message coverage: once where it came or was sent, and not once more
+    /// as a packet, and of a vehicle that speaks the version of the run.
+    fn is_counted(&self, entry: &Entry, place: &TopicOwner) -> bool {
+        let vehicle = self.header.vehicles.get(place.vehicle);
+        let version = vehicle.and_then(|vehicle| vehicle.protocol.as_ref());
+        matches!(entry.event(), Event::Message { .. } | Event::Sent { .. })
+            && version.is_none_or(|version| *version == self.header.protocol)
     }
 
     fn note_instants(&mut self, entry: &Entry) {

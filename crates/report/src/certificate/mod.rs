@@ -24,6 +24,9 @@ pub const OWED: [(&str, &str); 5] = [
     ("certificate.firmware-version", "the version of the software"),
 ];
 
+/// How many words of persons a certificate quotes; its annex has all.
+const WORDS: usize = 40;
+
 /// What a certificate says of who tested, in the order it is shown.
 const ORDER: [(&str, &str); 8] = [
     ("Laboratory", "certificate.laboratory"),
@@ -94,6 +97,12 @@ pub fn render(result: &RunResult, sources: &Sources, root: &str) -> Result<Strin
         order: order(result),
         levels: level::levels(result, sources),
         limits: statement::limits(result),
+        on_word: result
+            .on_word
+            .iter()
+            .take(WORDS)
+            .map(|one| (&one.test, one.to_string()))
+            .collect(),
         findings: findings(result, sources),
         deviations: result.deviations.iter().collect(),
         chapters: chapters(result, sources),
@@ -119,6 +128,8 @@ struct Certificate<'a> {
     order: Vec<(&'static str, String)>,
     levels: Vec<Level>,
     limits: Vec<String>,
+    /// The tests that rest on a person's word, and on which.
+    on_word: Vec<(&'a String, String)>,
     findings: Vec<Finding<'a>>,
     deviations: Vec<(&'a String, &'a String)>,
     chapters: Vec<Chapter<'a>>,

@@ -33,6 +33,8 @@ pub struct RequirementView {
     pub deciders: Vec<(String, Option<String>)>,
     /// Every verdict and how many gave it, where they disagree.
     pub verdicts: Option<String>,
+    /// Whether a test that decided it rests on a person's word.
+    pub on_word: bool,
     /// In which of the parts that were joined.
     pub parts: Option<String>,
     /// Why nothing decided it.
@@ -85,6 +87,13 @@ fn disagreement(requirement: &RequirementResult) -> Option<String> {
     (!words.is_empty()).then(|| words.join(", "))
 }
 
+/// What never came without which nothing decides a requirement, where that is known.
+fn never_came(requirement: &RequirementResult, result: &RunResult) -> Option<String> {
+    let mut undecided = result.message_coverage.iter().flat_map(|known| &known.undecided);
+    let found = undecided.find(|one| one.requirements.contains(&requirement.id))?;
+    Some(found.missing())
+}
+
 fn row(
     requirement: &RequirementResult,
     known: Option<&RequirementText>,
@@ -102,7 +111,10 @@ fn row(
         }
         (_, gap) => gap,
     };
-    let reason = reason.map(|why| why.to_string());
+    let reason = reason.map(|why| match never_came(requirement, result) {
+        Some(missing) => format!("{why}; never came: {missing}"),
+        None => why.to_string(),
+    });
     RequirementView {
         anchor: anchors.requirement(&requirement.id).unwrap_or_default(),
         badge: Badge::of_requirement(requirement),
@@ -124,6 +136,11 @@ fn row(
             .map(|id| (id.clone(), anchors.decider(id)))
             .collect(),
         verdicts: disagreement(requirement),
+        on_word: requirement.verdict.is_some()
+            && result
+                .on_word
+                .iter()
+                .any(|one| requirement.decided_by.contains(&one.test)),
         parts: in_parts(requirement),
         gap: reason.or_else(|| requirement.verdict.is_none().then(|| "no reason given".to_owned())),
         interpretation: known.and_then(|known| known.interpretation.clone()),

@@ -9,6 +9,7 @@ mod escape;
 mod evidence;
 mod exploration_view;
 mod matrix;
+mod message_coverage_view;
 mod messages;
 mod overview_view;
 mod pretty;
@@ -30,6 +31,7 @@ use super::fleet;
 use super::sources::Sources;
 use super::statement;
 use matrix::ChapterView;
+use message_coverage_view::CoverageView;
 use messages::{Gallery, MessageView};
 use overview_view::{AdviceView, FindingView, advice_views, finding_views};
 use tck_journal::event::Setting;
@@ -106,6 +108,10 @@ fn thinned(
             (None, None) => String::new(),
         },
         exploration: explored(result),
+        coverage: result
+            .message_coverage
+            .as_ref()
+            .map(|coverage| CoverageView::of(coverage, &anchors)),
         chapters: matrix::chapters(result, sources, &anchors),
         not_applicable: tests.iter().any(|test| test.not_applicable),
         tests,
@@ -166,6 +172,7 @@ struct Page<'a> {
     vehicles: Vec<view::VehicleRow>,
     reactions: String,
     exploration: Vec<(&'static str, Grid)>,
+    coverage: Option<CoverageView<'a>>,
     chapters: Vec<ChapterView>,
     tests: Vec<TestView>,
     shown_tests: usize,

@@ -31,6 +31,8 @@ pub struct TestView {
     pub flaky: bool,
     /// What was read over, and what else was done to get here.
     pub allowances: Vec<String>,
+    /// What rests on a person's word.
+    pub on_word: Vec<String>,
     pub not_applicable: bool,
     pub watchlist: bool,
     pub maturity_note: Option<String>,
@@ -249,6 +251,12 @@ fn view(
         repeated: repeated::summary(test),
         flaky: test.is_flaky(),
         allowances: test.allowances.clone(),
+        on_word: result
+            .on_word
+            .iter()
+            .filter(|one| one.test == test.id)
+            .map(ToString::to_string)
+            .collect(),
         not_applicable: verdict.is_none(),
         watchlist: test.maturity == "watchlist",
         maturity_note: test.maturity_note.clone(),
