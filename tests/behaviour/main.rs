@@ -13,6 +13,7 @@ mod brokers;
 mod bystanders;
 mod campaigns;
 mod certificates;
+mod counterparts;
 mod discovering;
 mod exit_codes;
 mod exploring;

@@ -8,7 +8,8 @@ use std::sync::Arc;
 use serde_json::{Map, Value, json};
 
 use super::compose_error::ComposeError;
-use super::ids::IdForm;
+use super::ids::{IdForm, uuid_of_action};
+use super::manner::{Manner, Manners};
 use super::route::{RouteBuilder, SentOrders};
 use tck_base::clock::Stamp;
 use tck_base::device::Publication;
@@ -36,6 +37,7 @@ pub struct Composer {
     /// The factsheet of the device the message is for.
     factsheet: Option<Arc<FactsheetView>>,
     orders: SentOrders,
+    manners: Manners,
 }
 
 impl Composer {
@@ -48,7 +50,20 @@ impl Composer {
             ids: IdForm::default(),
             factsheet: None,
             orders: SentOrders::default(),
+            manners: Manners::default(),
         }
+    }
+
+    /// Words messages in these manners.
+    #[must_use]
+    pub fn in_manners(mut self, manners: Manners) -> Self {
+        self.manners = manners;
+        self
+    }
+
+    /// How an instant action blocks where nothing depends on it.
+    pub fn instant_blocking(&self) -> &'static str {
+        self.manners.blocking()
     }
 
     /// Forgets the orders of the test before.
@@ -59,7 +74,10 @@ impl Composer {
     /// A fresh actionId, as the factsheet of the vehicle wants ids as far as it is known.
     pub fn action_id(&mut self) -> String {
         self.action_count += 1;
-        self.ids.of_action(&self.run, self.action_count)
+        match self.ids {
+            IdForm::Readable if self.manners.has(Manner::UuidActionIds) => uuid_of_action(&self.run, self.action_count),
+            ids => ids.of_action(&self.run, self.action_count),
+        }
     }
 
     /// Makes the message of a `send` step.
@@ -90,7 +108,7 @@ impl Composer {
             }
         } else {
             let message = self.message(send, bindings, ground, now, &mut actions)?;
-            message.to_string().into_bytes()
+            self.manners.text(&message)
         };
         Ok(Composed {
             message: Publication {
@@ -122,7 +140,7 @@ impl Composer {
         }
         Ok(Publication {
             topic: full,
-            payload: Value::Object(message).to_string().into_bytes().into(),
+            payload: self.manners.text(&Value::Object(message)).into(),
             qos: ground.pack.topic(topic).map_or(0, |rule| rule.qos),
             retain: false,
         })
@@ -138,8 +156,10 @@ impl Composer {
     ) -> Result<Value, ComposeError> {
         let mut message = self.header(&send.topic, ground, now);
         let payload = send.payload.as_ref().map(|term| term.bind(bindings)).transpose()?;
+        // What is broken on purpose has to be there first.
+        let brief = send.patch.is_none() && self.manners.has(Manner::EmptyParametersLeftOut);
         if !send.actions.is_empty() {
-            let list = self.actions(&send.actions, true, bindings, actions)?;
+            let list = self.actions(&send.actions, (true, brief), bindings, actions)?;
             message.insert("actions".to_owned(), Value::Array(list));
         }
         if let Some(route) = &send.route {
@@ -153,7 +173,10 @@ impl Composer {
             message.insert("orderUpdateId".to_owned(), json!(0));
             let mut placed = BTreeMap::new();
             for (at, (place, list)) in route.actions.iter().enumerate() {
-                placed.insert(at, (place.clone(), self.actions(list, false, bindings, actions)?));
+                placed.insert(
+                    at,
+                    (place.clone(), self.actions(list, (false, brief), bindings, actions)?),
+                );
             }
             let builder = RouteBuilder {
                 course: bindings.get("course"),
@@ -186,7 +209,7 @@ impl Composer {
     fn actions(
         &mut self,
         list: &[SendAction],
-        instant: bool,
+        (instant, brief): (bool, bool),
         bindings: &Bindings,
         named: &mut Vec<(String, String)>,
     ) -> Result<Vec<Value>, ComposeError> {
@@ -218,16 +241,15 @@ impl Composer {
                 // How an instant action blocks is nothing a test is about.
                 said => usual_blocking(
                     &action_type,
-                    said.unwrap_or_else(|| json!("HARD")),
+                    said.unwrap_or_else(|| json!(self.manners.blocking())),
                     self.factsheet.as_deref(),
                 ),
             };
-            all.push(json!({
-                "actionType": action_type,
-                "actionId": id,
-                "blockingType": blocking,
-                "actionParameters": parameters,
-            }));
+            let mut made = json!({ "actionType": action_type, "actionId": id, "blockingType": blocking });
+            if !(brief && parameters.is_empty()) {
+                made["actionParameters"] = Value::Array(parameters);
+            }
+            all.push(made);
             if let (Some(name), true) = (&action.name, fresh) {
                 named.push((name.clone(), id));
             }

@@ -18,7 +18,7 @@ mod hooks;
 mod hooks_file;
 mod participant;
 mod protocol;
-mod reader;
+pub mod reader;
 mod schema;
 mod shape;
 mod validator;

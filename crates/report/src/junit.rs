@@ -267,6 +267,7 @@ fn with_properties(xml: &str, result: &RunResult, flavour: Flavour<'_>) -> Strin
         ("manufacturer", Some(&device.manufacturer)),
         ("serialNumber", Some(&device.serial_number)),
         ("firmwareVersion", result.setting("certificate.firmware-version")),
+        ("counterpart", result.setting("counterpart")),
         ("suites", Some(&result.suites_sha256)),
         ("shard", shard.as_deref()),
         ("shardOrigin", origin),

@@ -5,6 +5,7 @@ use std::time::Duration;
 use super::selection::{Criteria, Selection, SelectionError};
 use super::share::share;
 use tck_base::shard::ChosenShard;
+use tck_engine::Manners;
 use tck_journal::event::ShardRecord;
 use tck_judge::Library;
 use tck_pack::{Pack, Role};
@@ -32,6 +33,8 @@ pub struct Request {
     pub limits: Vec<String>,
     /// Which part of a run it is.
     pub shard: Option<ShardRecord>,
+    /// How the harness words its messages.
+    pub manners: Manners,
 }
 
 impl Request {
@@ -210,6 +213,7 @@ impl RequestBuilder {
             certifies: self.certifies,
             limits: shard.iter().map(|shard| shard.limit("tests was run")).collect(),
             shard,
+            manners: Manners::default(),
         })
     }
 }
