@@ -66,6 +66,14 @@ impl Composer {
         self.manners.blocking()
     }
 
+    /// How many bytes a message for the vehicle may have, as far as its factsheet says that.
+    fn longest(&self) -> Option<u64> {
+        let limits = self.factsheet.as_ref().and_then(|sheet| sheet.string_limits());
+        limits
+            .and_then(|limits| limits.msg_len.whole())
+            .filter(|longest| *longest > 0)
+    }
+
     /// Forgets the orders of the test before.
     pub fn begin_test(&mut self) {
         self.orders = SentOrders::default();
@@ -108,7 +116,7 @@ impl Composer {
             }
         } else {
             let message = self.message(send, bindings, ground, now, &mut actions)?;
-            self.manners.text(&message)
+            self.manners.text(&message, self.longest())
         };
         Ok(Composed {
             message: Publication {
@@ -140,7 +148,7 @@ impl Composer {
         }
         Ok(Publication {
             topic: full,
-            payload: self.manners.text(&Value::Object(message)).into(),
+            payload: self.manners.text(&Value::Object(message), self.longest()).into(),
             qos: ground.pack.topic(topic).map_or(0, |rule| rule.qos),
             retain: false,
         })
@@ -156,10 +164,8 @@ impl Composer {
     ) -> Result<Value, ComposeError> {
         let mut message = self.header(&send.topic, ground, now);
         let payload = send.payload.as_ref().map(|term| term.bind(bindings)).transpose()?;
-        // What is broken on purpose has to be there first.
-        let brief = send.patch.is_none() && self.manners.has(Manner::EmptyParametersLeftOut);
         if !send.actions.is_empty() {
-            let list = self.actions(&send.actions, (true, brief), bindings, actions)?;
+            let list = self.actions(&send.actions, Some(send), bindings, actions)?;
             message.insert("actions".to_owned(), Value::Array(list));
         }
         if let Some(route) = &send.route {
@@ -173,10 +179,7 @@ impl Composer {
             message.insert("orderUpdateId".to_owned(), json!(0));
             let mut placed = BTreeMap::new();
             for (at, (place, list)) in route.actions.iter().enumerate() {
-                placed.insert(
-                    at,
-                    (place.clone(), self.actions(list, (false, brief), bindings, actions)?),
-                );
+                placed.insert(at, (place.clone(), self.actions(list, None, bindings, actions)?));
             }
             let builder = RouteBuilder {
                 course: bindings.get("course"),
@@ -206,13 +209,17 @@ impl Composer {
         Ok(message)
     }
 
+    /// The actions of an order, or of a message with instant actions.
     fn actions(
         &mut self,
         list: &[SendAction],
-        (instant, brief): (bool, bool),
+        instant: Option<&Send>,
         bindings: &Bindings,
         named: &mut Vec<(String, String)>,
     ) -> Result<Vec<Value>, ComposeError> {
+        // What is broken on purpose has to be there first.
+        let whole =
+            instant.is_none_or(|send| send.patch.is_some()) || !self.manners.has(Manner::EmptyParametersLeftOut);
         let mut all = Vec::new();
         for action in list {
             let known = action
@@ -237,16 +244,16 @@ impl Composer {
             let action_type = action.action.bind(bindings)?;
             let blocking = action.blocking.as_ref().map(|term| term.bind(bindings)).transpose()?;
             let blocking = match blocking {
-                Some(said) if !instant => said,
+                Some(said) if instant.is_none() => said,
                 // How an instant action blocks is nothing a test is about.
-                said => usual_blocking(
-                    &action_type,
-                    said.unwrap_or_else(|| json!(self.manners.blocking())),
-                    self.factsheet.as_deref(),
-                ),
+                said => {
+                    let usual = instant.map_or("HARD", |_| self.manners.blocking());
+                    let usual = said.unwrap_or_else(|| json!(usual));
+                    usual_blocking(&action_type, usual, self.factsheet.as_deref())
+                }
             };
             let mut made = json!({ "actionType": action_type, "actionId": id, "blockingType": blocking });
-            if !(brief && parameters.is_empty()) {
+            if whole || !parameters.is_empty() {
                 made["actionParameters"] = Value::Array(parameters);
             }
             all.push(made);

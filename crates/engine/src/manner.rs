@@ -12,7 +12,7 @@ pub enum Manner {
     PrettyPrinted,
     /// Instant actions have the blocking type NONE where a vehicle does not want another one.
     InstantsBlockNothing,
-    /// An action without parameters has no list of them.
+    /// An instant action without parameters has no list of them.
     EmptyParametersLeftOut,
     /// actionIds look like UUIDs where a vehicle takes such long ones.
     UuidActionIds,
@@ -66,14 +66,13 @@ impl Manners {
         }
     }
 
-    /// The text of a message.
+    /// The text of a message for a vehicle that takes messages of so many bytes; of any length where none is known.
     #[must_use]
-    pub fn text(&self, message: &Value) -> Vec<u8> {
-        if self.has(Manner::PrettyPrinted) {
-            format!("{message:#}").into_bytes()
-        } else {
-            message.to_string().into_bytes()
-        }
+    pub fn text(&self, message: &Value, longest: Option<u64>) -> Vec<u8> {
+        let fits = |text: &String| longest.is_none_or(|longest| text.len() as u64 <= longest);
+        let pretty = self.has(Manner::PrettyPrinted).then(|| format!("{message:#}"));
+        let text = pretty.filter(fits).unwrap_or_else(|| message.to_string());
+        text.into_bytes()
     }
 }
 
@@ -85,8 +84,10 @@ mod tests {
     #[test]
     fn a_message_says_the_same_in_every_manner() {
         let message = json!({ "headerId": 1, "nodes": [{ "x": 1.0, "y": -2.5e-7 }], "empty": [] });
-        let plain = Manners::default().text(&message);
-        let pretty = Manners::new([Manner::PrettyPrinted]).text(&message);
+        let plain = Manners::default().text(&message, None);
+        let manners = Manners::new([Manner::PrettyPrinted]);
+        let pretty = manners.text(&message, Some(200));
+        assert_eq!(manners.text(&message, Some(80)), plain, "it has to fit");
         assert!(pretty.len() > plain.len() && pretty.contains(&b'\n') && !plain.contains(&b'\n'));
         for text in [plain, pretty] {
             assert_eq!(serde_json::from_slice::<Value>(&text).ok(), Some(message.clone()));
