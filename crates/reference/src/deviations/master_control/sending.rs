@@ -95,7 +95,7 @@ records! {
         => happening(|site, vehicle, event| if let Event::State(_) = event {
             let Some(id) = vehicle.cancel.as_ref().map(|cancel| cancel.action_id.clone()) else { return };
             let seen = vehicle.state.as_ref().and_then(|state| state.action(&id));
-            let runs = seen.is_some_and(|action| !action.is_terminal());
+            let runs = seen.is_some_and(|action| !action.is_terminal()) && site.commandable(vehicle);
             let sent = vehicle.instants.iter().find(|instant| instant.id() == id).map(|instant| instant.action.clone());
             if let Some(action) = sent.filter(|_| runs) { site.publish(vehicle, "instantActions", &json!({ "actions": [action] })); }
         });
