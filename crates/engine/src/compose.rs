@@ -61,11 +61,6 @@ impl Composer {
         self
     }
 
-    /// How an instant action blocks where nothing depends on it.
-    pub fn instant_blocking(&self) -> &'static str {
-        self.manners.blocking()
-    }
-
     /// How many bytes a message for the vehicle may have, as far as its factsheet says that.
     fn longest(&self) -> Option<u64> {
         let limits = self.factsheet.as_ref().and_then(|sheet| sheet.string_limits());

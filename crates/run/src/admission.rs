@@ -225,9 +225,8 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
     /// Sends one instant action outside any test, and gives its id.
     pub(super) async fn instant_action(&mut self, action_type: &str, parameters: Value) -> Result<String, EngineError> {
         let id = self.engine.composer.action_id();
-        let blocking = self.engine.composer.instant_blocking();
         let members = json!({ "actions": [{
-            "actionType": action_type, "actionId": id, "blockingType": blocking, "actionParameters": parameters,
+            "actionType": action_type, "actionId": id, "blockingType": "HARD", "actionParameters": parameters,
         }] });
         let now = self.engine.link.now();
         let message = self
