@@ -16,8 +16,7 @@ fn mistake(role: &str, habits: &str) -> String {
     format!("{} {}", all[0].span.as_ref().unwrap().place(), all[0].title)
 }
 
-const VEHICLE: &str = "\
-  - does: It writes CONNECTIONBROKEN with QoS 0.
+const VEHICLE: &str = "  - does: It writes CONNECTIONBROKEN with QoS 0.
     as: will-qos-0
     where: will.ts
   - does: It publishes the state with QoS 1.
