@@ -63,15 +63,16 @@ pub(super) fn counterpart(one: &Counterpart) -> Value {
 }
 
 fn habit_of(habit: &Habit, in_run: &[&str]) -> Value {
-    let (why, deviation) = match &habit.imitation {
+    let (not, only_simulated) = match &habit.imitation {
         Imitation::Not(why) => (Some(why), None),
-        Imitation::Imitated { deviation, .. } => (None, *deviation),
+        Imitation::Imitated { only_simulated, .. } => (None, only_simulated.as_ref()),
     };
+    let deviation = habit.deviation();
     let manner = habit.manner().map(tck_engine::Manner::word);
     let taken = manner.or(deviation.map(|deviation| deviation.name));
     json!({ "does": habit.does, "as": deviation.map(|deviation| deviation.name),
         "kind": deviation.map(|deviation| deviation.kind.word()), "inRun": taken.filter(|name| in_run.contains(name)),
-        "notImitated": why, "where": habit.place, "seen": habit.seen })
+        "onlySimulated": only_simulated, "notImitated": not, "where": habit.place, "seen": habit.seen })
 }
 
 fn faults() -> impl Iterator<Item = (Role, &'static Fault)> {
