@@ -100,7 +100,7 @@ fn what_makes_no_sense_is_named_at_its_place() {
         ("agv", "    as: will-qos-0", "`where` is missing"),
         (
             "agv",
-            "    as: will-qos-0\n    where: x\n    not-imitated: y",
+            "    as: will-qos-0\n    where: x\n    not-imitated: so it is",
             "a habit that is imitated and is not",
         ),
         (
@@ -120,7 +120,7 @@ fn what_makes_no_sense_is_named_at_its_place() {
         ),
         (
             "agv",
-            "    as: will-qos-0\n    where: x\n    becuase: y",
+            "    as: will-qos-0\n    where: x\n    becuase: so it is",
             "unknown key `becuase`",
         ),
     ] {
