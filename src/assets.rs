@@ -7,9 +7,11 @@ use include_dir::{Dir, DirEntry, include_dir};
 use tck_base::diagnostic::Diagnostic;
 use tck_judge::Library;
 use tck_pack::{AssetFile, Assets};
+use tck_simulate::Counterparts;
 
 static SUITES: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/suites");
 static SCHEMAS: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/schemas");
+static COUNTERPARTS: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/counterparts");
 
 /// A folder of suites, laid out like `suites/`.
 #[derive(Clone, Copy, Debug)]
@@ -27,6 +29,16 @@ pub fn embedded() -> Assets {
     embedded_files("suites", &SUITES, &mut files);
     embedded_files("schemas", &SCHEMAS, &mut files);
     Assets::built_in(files)
+}
+
+/// The counterparts the program was built with. Nothing is judged by them, so they are no part of the suites.
+///
+/// # Errors
+/// Every mistake in their files.
+pub fn counterparts() -> Result<Counterparts, Vec<Diagnostic>> {
+    let mut files = Vec::new();
+    embedded_files("counterparts", &COUNTERPARTS, &mut files);
+    Counterparts::read(files.into_iter().map(|file| (file.path, file.text)))
 }
 
 /// The suites the program was built with and those of a folder, ready to judge by.
@@ -102,5 +114,17 @@ mod tests {
         // The program does not lint what it carries; as files of a folder they are.
         let linted = Library::load(own, crate::checks::REGISTRY);
         assert!(linted.is_ok_and(|library| !library.rules.suites.tests.is_empty()));
+    }
+
+    #[test]
+    fn the_counterparts_are_written_well() {
+        let known = counterparts().unwrap_or_else(|all| panic!("{}", all[0].render(false)));
+        for role in [tck_pack::Role::Agv, tck_pack::Role::MasterControl] {
+            assert!(known.all().filter(|one| one.role == role).count() > 2, "{role}");
+        }
+        // A sentence each, with a reason where nothing comes of it.
+        for habit in known.all().flat_map(|one| &one.habits) {
+            assert!(habit.does.ends_with('.') && habit.place.len() > 10, "{habit:?}");
+        }
     }
 }

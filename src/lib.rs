@@ -53,7 +53,7 @@ mod facade;
 #[doc(hidden)]
 pub mod ui;
 
-pub use assets::{Own, embedded, library};
+pub use assets::{Own, counterparts, embedded, library};
 pub use facade::{Error, Outcome, Tck};
 pub use tck_base::verdict::Verdict;
 pub use tck_pack::Role;

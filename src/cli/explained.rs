@@ -9,7 +9,7 @@ use tck_judge::Library;
 use tck_pack::{HookInfo, Pack, Requirement, Role};
 use tck_profile::{HookExample, SAMPLE_ACTIONS, STATEMENTS};
 use tck_reference::Fault;
-use tck_simulate::BuiltIn;
+use tck_simulate::{BuiltIn, Counterpart, Habit, Imitation};
 use tck_suite::model::{Monitor, Rule, Test};
 
 /// Everything that has this name.
@@ -53,6 +53,26 @@ pub(super) fn settings() -> impl Iterator<Item = (&'static str, &'static str)> {
 pub(super) fn setting(id: &str) -> Option<&'static str> {
     let name = id.strip_prefix("device.").unwrap_or(id);
     settings().find(|(known, _)| *known == name).map(|(_, doc)| doc)
+}
+
+/// A known product, with its habits.
+pub(super) fn counterpart(one: &Counterpart) -> Value {
+    let habits: Vec<Value> = one.habits.iter().map(|habit| habit_of(habit, &one.in_run())).collect();
+    json!({ "name": one.name, "title": one.title, "role": one.role.word(), "protocol": one.protocol,
+        "topicTemplate": one.topic_template, "source": one.source, "habits": habits })
+}
+
+fn habit_of(habit: &Habit, in_run: &[&str]) -> Value {
+    let (not, only_simulated) = match &habit.imitation {
+        Imitation::Not(why) => (Some(why), None),
+        Imitation::Imitated { only_simulated, .. } => (None, only_simulated.as_ref()),
+    };
+    let deviation = habit.deviation();
+    let manner = habit.manner().map(tck_engine::Manner::word);
+    let taken = manner.or(deviation.map(|deviation| deviation.name));
+    json!({ "does": habit.does, "as": deviation.map(|deviation| deviation.name),
+        "kind": deviation.map(|deviation| deviation.kind.word()), "inRun": taken.filter(|name| in_run.contains(name)),
+        "onlySimulated": only_simulated, "notImitated": not, "where": habit.place, "seen": habit.seen })
 }
 
 fn faults() -> impl Iterator<Item = (Role, &'static Fault)> {

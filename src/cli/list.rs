@@ -135,6 +135,14 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
                 |(role, one)| json!({ "name": one.name, "role": role.word(), "under": one.under, "does": one.does }),
             ))
         }
+        (Listing::Counterparts, format) => {
+            let known = crate::assets::counterparts()?;
+            let all = known.all().filter(|one| roles.contains(&one.role));
+            match format {
+                Format::Text => ui::counterparts(all),
+                Format::Json => lines(all.map(super::explained::counterpart)),
+            }
+        }
         (Listing::Hooks, Format::Text) => ui::hooks(&library.rules.hooks),
         (Listing::Hooks, Format::Json) => lines(library.rules.hooks.all().map(|hook| {
             let parameters: Vec<&str> = hook

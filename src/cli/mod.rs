@@ -22,6 +22,7 @@ mod gate;
 mod history;
 mod impaired;
 mod language;
+mod like;
 mod list;
 mod log;
 mod merge;

@@ -6,9 +6,10 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use super::args::{Format, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl, SimulatedSite};
+use super::args::{ConnectionArgs, Format, Simulate, Simulated, SimulatedAgv, SimulatedMasterControl, SimulatedSite};
 use super::device::{check_faults, tolerate};
 use super::exit::Exit;
+use super::like::{joined, named};
 use super::problem::Problem;
 use super::signals::Signals;
 use tck_base::clock::WallClock;
@@ -17,17 +18,18 @@ use tck_course::Layout;
 use tck_net::bench::endpoint::Endpoint;
 use tck_pack::{Pack, Packs, Role};
 use tck_simulate::driver::RunningDevice;
-use tck_simulate::{BuiltIn, Fleet, HookServer, ReferenceAgv, ReferenceMasterControl, Site};
+use tck_simulate::{BuiltIn, Counterpart, Fleet, HookServer, ReferenceAgv, ReferenceMasterControl, Site};
 
 /// `simulate`.
 pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
-    let connection = match &arguments.what {
-        Simulated::Agv(device) => &device.connection,
-        Simulated::MasterControl(device) => &device.connection,
+    let (connection, like) = match &arguments.what {
+        Simulated::Agv(device) => (&device.connection, named(device.like.as_deref(), Role::Agv)?),
+        Simulated::MasterControl(device) => (&device.connection, named(device.like.as_deref(), Role::MasterControl)?),
         Simulated::Site(recording) => return site(recording),
     };
+    let spoken = like.as_ref().and_then(|like| like.protocol.as_deref());
     let packs = Packs::load(&crate::assets::embedded()).map_err(|error| Problem::Environment(error.to_string()))?;
-    let pack = super::pack_for_devices(&packs, connection.protocol.as_deref())?;
+    let pack = super::pack_for_devices(&packs, connection.protocol.as_deref().or(spoken))?;
     let endpoint = super::discover::endpoint(&connection.access)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
@@ -36,9 +38,9 @@ pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
     let runtime = runtime.map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
     runtime.block_on(async {
         match &arguments.what {
-            Simulated::Agv(device) => agvs(device, &pack, &endpoint, arguments.format).await,
+            Simulated::Agv(device) => agvs(device, like.as_ref(), &pack, &endpoint, arguments.format).await,
             Simulated::MasterControl(device) => {
-                master_control(device, (&packs, &pack), &endpoint, arguments.format).await
+                master_control(device, like.as_ref(), (&packs, &pack), &endpoint, arguments.format).await
             }
             Simulated::Site(recording) => site(recording),
         }
@@ -97,6 +99,20 @@ fn start(
     started.map_err(|error| Diagnostic::whole("fault", error.to_string()).into())
 }
 
+/// The faults and tolerances that were asked for, and those of a counterpart.
+fn habits(faults: &[String], tolerances: &[String], like: Option<&Counterpart>) -> (Vec<String>, Vec<String>) {
+    (
+        joined(faults, like, |like| like.faults().collect()),
+        joined(tolerances, like, |like| like.tolerances().collect()),
+    )
+}
+
+/// How topics begin: as it was asked for, or as those of a counterpart do.
+fn template<'a>(connection: &'a ConnectionArgs, like: Option<&'a Counterpart>) -> Option<&'a str> {
+    let own = like.and_then(|like| like.topic_template.as_deref());
+    connection.topic_template.as_deref().or(own)
+}
+
 /// Signs a device off.
 async fn end(device: RunningDevice) {
     device.command("shutdown", Value::Null).await;
@@ -114,8 +130,15 @@ fn say(format: Format, text: &str, event: &Value) -> Result<(), Problem> {
     }
 }
 
-async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint, format: Format) -> Result<Exit, Problem> {
+async fn agvs(
+    device: &SimulatedAgv,
+    like: Option<&Counterpart>,
+    pack: &Arc<Pack>,
+    endpoint: &Endpoint,
+    format: Format,
+) -> Result<Exit, Problem> {
     check_faults(Role::Agv, &device.fault)?;
+    let (faults, tolerances) = habits(&device.fault, &device.tolerance, like);
     let mut signals = Signals::listen()?;
     let clock = WallClock::start();
     let mut running = Vec::new();
@@ -127,18 +150,18 @@ async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint, form
             device.serial.clone()
         };
         let mut reference = ReferenceAgv::of(device.vehicle.0, pack);
-        let template = device.connection.topic_template.as_deref();
+        let template = template(&device.connection, like);
         reference.rename(&device.manufacturer, &serial, template, pack);
         if let Some(seconds) = device.state_interval {
             reference.config.state_interval = Duration::from_secs_f64(seconds);
         }
         let mut reference = BuiltIn::from(reference);
-        tolerate(&mut reference, &device.tolerance)?;
+        tolerate(&mut reference, &tolerances)?;
         let mut endpoint = endpoint.clone();
         if let Some(client_id) = endpoint.client_id.as_mut().filter(|_| is_fleet) {
             *client_id = format!("{client_id}-{number}");
         }
-        let mut agv = start(&reference, &device.fault, &endpoint, clock)?;
+        let mut agv = start(&reference, &faults, &endpoint, clock)?;
         if running.is_empty() {
             enter(&mut agv, &endpoint).await?;
         }
@@ -187,14 +210,16 @@ async fn agvs(device: &SimulatedAgv, pack: &Arc<Pack>, endpoint: &Endpoint, form
 
 async fn master_control(
     device: &SimulatedMasterControl,
+    like: Option<&Counterpart>,
     (packs, pack): (&Packs, &Arc<Pack>),
     endpoint: &Endpoint,
     format: Format,
 ) -> Result<Exit, Problem> {
     check_faults(Role::MasterControl, &device.fault)?;
+    let (faults, tolerances) = habits(&device.fault, &device.tolerance, like);
     let mut signals = Signals::listen()?;
-    let mut reference = BuiltIn::from(configured(device, packs, pack)?);
-    tolerate(&mut reference, &device.tolerance)?;
+    let mut reference = BuiltIn::from(configured(device, template(&device.connection, like), packs, pack)?);
+    tolerate(&mut reference, &tolerances)?;
     // Two of them may live at one broker, and whoever comes under the client id of another one throws it out.
     let made_up = || {
         let random = uuid::Uuid::new_v4().simple().to_string();
@@ -202,7 +227,7 @@ async fn master_control(
     };
     let mut endpoint = endpoint.clone();
     endpoint.client_id.get_or_insert_with(made_up);
-    let mut running = start(&reference, &device.fault, &endpoint, WallClock::start())?;
+    let mut running = start(&reference, &faults, &endpoint, WallClock::start())?;
     enter(&mut running, &endpoint).await?;
     let server = HookServer::start(&device.hooks, running, reference.hooks()).await;
     let server = server.map_err(|error| Problem::Environment(error.to_string()))?;
@@ -228,6 +253,7 @@ async fn master_control(
 /// The master control as the command line wants it.
 fn configured(
     device: &SimulatedMasterControl,
+    template: Option<&str>,
     packs: &Packs,
     pack: &Arc<Pack>,
 ) -> Result<ReferenceMasterControl, Problem> {
@@ -244,9 +270,7 @@ fn configured(
         if let Some(layout) = &layout {
             like.live_on(layout.clone());
         }
-        like.subject
-            .topic_template
-            .clone_from(&device.connection.topic_template);
+        like.subject.topic_template = template.map(str::to_owned);
         like
     };
     let mut fleet = Fleet::default();

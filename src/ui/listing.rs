@@ -1,4 +1,4 @@
-//! Texts of `list hooks`, `list vehicle`, `list faults` and `list tolerances`.
+//! Texts of `list hooks`, `list vehicle`, `list faults`, `list tolerances` and `list counterparts`.
 
 use std::fmt::Write as _;
 
@@ -6,6 +6,7 @@ use tck_pack::{Hooks, Role};
 use tck_profile::VehicleWord;
 use tck_reference::Fault;
 use tck_reference::deviations::agv::Tolerance;
+use tck_simulate::{Counterpart, Habit, Imitation};
 
 /// Every hook with its parameters, by role.
 #[must_use]
@@ -87,10 +88,65 @@ pub fn tolerances(tolerances: &[Tolerance]) -> String {
     })
 }
 
+/// Every counterpart with its habits: what is done about each, and where it was seen.
+#[must_use]
+pub fn counterparts<'a>(all: impl Iterator<Item = &'a Counterpart>) -> String {
+    let mut text = String::new();
+    for one in all {
+        let version = one.protocol.as_ref().map(|version| format!(", VDA 5050 {version}"));
+        let _ = writeln!(
+            text,
+            "{}{}: {} (role {}{})\n  seen in {}\n",
+            if text.is_empty() { "" } else { "\n" },
+            one.name,
+            one.title,
+            one.role,
+            version.unwrap_or_default(),
+            one.source,
+        );
+        let in_run = one.in_run();
+        for habit in &one.habits {
+            let _ = writeln!(text, "  {}\n      {}", habit.does, imitated(habit, &in_run));
+            let _ = writeln!(text, "      {} ({})", habit.place, habit.seen);
+        }
+    }
+    text
+}
+
+/// By what a habit is imitated, and where.
+fn imitated(habit: &Habit, in_run: &[&str]) -> String {
+    let (deviation, manner, only_simulated) = match &habit.imitation {
+        Imitation::Not(why) => return format!("not imitated: {why}"),
+        Imitation::Imitated {
+            deviation,
+            manner,
+            only_simulated,
+        } => (deviation, manner, only_simulated),
+    };
+    let simulated = match deviation {
+        Some(deviation) => format!("simulate: {} {}", deviation.kind.word(), deviation.name),
+        None => "simulate: the reference device does so anyway".to_owned(),
+    };
+    let name = manner
+        .map(tck_engine::Manner::word)
+        .or(deviation.map(|deviation| deviation.name));
+    let run = name
+        .filter(|name| in_run.contains(name))
+        .map(|name| format!("; run: {name}"));
+    let why = only_simulated.as_ref().map(|why| format!("; not in a run: {why}"));
+    simulated + &run.or(why).unwrap_or_default()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use tck_profile::VEHICLE_WORDS;
+
+    #[test]
+    fn counterparts_are_listed_with_their_habits_and_where_they_were_seen() {
+        let known = crate::counterparts().expect("the built-in counterparts");
+        insta::assert_snapshot!(counterparts(known.all()));
+    }
 
     #[test]
     fn hooks_are_listed_by_role_with_their_parameters() {

@@ -17,7 +17,7 @@ mod watching;
 pub use full_screen::FullScreen;
 pub use heartbeat::Heartbeat;
 pub use hook::hook;
-pub use listing::{faults, hooks, tolerances, vehicle_words};
+pub use listing::{counterparts, faults, hooks, tolerances, vehicle_words};
 pub use output::{Output, escaped};
 pub use progress::{Progress, RunTitle, TestLine};
 pub use prompt::{Follower, Prompter, put_terminal_back};

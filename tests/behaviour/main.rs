@@ -14,6 +14,7 @@ mod bystanders;
 mod campaigns;
 mod certificates;
 mod cluster;
+mod counterparts;
 mod discovering;
 mod exit_codes;
 mod exploring;

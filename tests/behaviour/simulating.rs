@@ -221,7 +221,7 @@ reconnect = "1 s"
 }
 
 /// Runs these tests against the simulated master control.
-fn judged(more: &str, tests: &[&str]) -> (Bench, Ended) {
+pub fn judged(more: &str, tests: &[&str]) -> (Bench, Ended) {
     let bench = Bench::new();
     std::fs::write(bench.path().join("device.toml"), commanded(more)).unwrap();
     let ended = bench.run(&[&["run", "--profile", "device.toml"], tests].concat());

@@ -8,7 +8,8 @@ use std::sync::Arc;
 use serde_json::{Map, Value, json};
 
 use super::compose_error::ComposeError;
-use super::ids::IdForm;
+use super::ids::{IdForm, uuid_of_action};
+use super::manner::{Manner, Manners};
 use super::route::{RouteBuilder, SentOrders};
 use tck_base::clock::Stamp;
 use tck_base::device::Publication;
@@ -36,6 +37,7 @@ pub struct Composer {
     /// The factsheet of the device the message is for.
     factsheet: Option<Arc<FactsheetView>>,
     orders: SentOrders,
+    manners: Manners,
 }
 
 impl Composer {
@@ -48,7 +50,23 @@ impl Composer {
             ids: IdForm::default(),
             factsheet: None,
             orders: SentOrders::default(),
+            manners: Manners::default(),
         }
+    }
+
+    /// Words messages in these manners.
+    #[must_use]
+    pub fn in_manners(mut self, manners: Manners) -> Self {
+        self.manners = manners;
+        self
+    }
+
+    /// How many bytes a message for the vehicle may have, as far as its factsheet says that.
+    fn longest(&self) -> Option<u64> {
+        let limits = self.factsheet.as_ref().and_then(|sheet| sheet.string_limits());
+        limits
+            .and_then(|limits| limits.msg_len.whole())
+            .filter(|longest| *longest > 0)
     }
 
     /// Forgets the orders of the test before.
@@ -59,7 +77,10 @@ impl Composer {
     /// A fresh actionId, as the factsheet of the vehicle wants ids as far as it is known.
     pub fn action_id(&mut self) -> String {
         self.action_count += 1;
-        self.ids.of_action(&self.run, self.action_count)
+        match self.ids {
+            IdForm::Readable if self.manners.has(Manner::UuidActionIds) => uuid_of_action(&self.run, self.action_count),
+            ids => ids.of_action(&self.run, self.action_count),
+        }
     }
 
     /// Makes the message of a `send` step.
@@ -90,7 +111,7 @@ impl Composer {
             }
         } else {
             let message = self.message(send, bindings, ground, now, &mut actions)?;
-            message.to_string().into_bytes()
+            self.manners.text(&message, self.longest())
         };
         Ok(Composed {
             message: Publication {
@@ -122,7 +143,7 @@ impl Composer {
         }
         Ok(Publication {
             topic: full,
-            payload: Value::Object(message).to_string().into_bytes().into(),
+            payload: self.manners.text(&Value::Object(message), self.longest()).into(),
             qos: ground.pack.topic(topic).map_or(0, |rule| rule.qos),
             retain: false,
         })
@@ -139,7 +160,7 @@ impl Composer {
         let mut message = self.header(&send.topic, ground, now);
         let payload = send.payload.as_ref().map(|term| term.bind(bindings)).transpose()?;
         if !send.actions.is_empty() {
-            let list = self.actions(&send.actions, true, bindings, actions)?;
+            let list = self.actions(&send.actions, Some(send), bindings, actions)?;
             message.insert("actions".to_owned(), Value::Array(list));
         }
         if let Some(route) = &send.route {
@@ -153,7 +174,7 @@ impl Composer {
             message.insert("orderUpdateId".to_owned(), json!(0));
             let mut placed = BTreeMap::new();
             for (at, (place, list)) in route.actions.iter().enumerate() {
-                placed.insert(at, (place.clone(), self.actions(list, false, bindings, actions)?));
+                placed.insert(at, (place.clone(), self.actions(list, None, bindings, actions)?));
             }
             let builder = RouteBuilder {
                 course: bindings.get("course"),
@@ -188,13 +209,17 @@ impl Composer {
         Ok(message)
     }
 
+    /// The actions of an order, or of a message with instant actions.
     fn actions(
         &mut self,
         list: &[SendAction],
-        instant: bool,
+        instant: Option<&Send>,
         bindings: &Bindings,
         named: &mut Vec<(String, String)>,
     ) -> Result<Vec<Value>, ComposeError> {
+        // What is broken on purpose has to be there first.
+        let whole =
+            instant.is_none_or(|send| send.patch.is_some()) || !self.manners.has(Manner::EmptyParametersLeftOut);
         let mut all = Vec::new();
         for action in list {
             let known = action
@@ -219,20 +244,19 @@ impl Composer {
             let action_type = action.action.bind(bindings)?;
             let blocking = action.blocking.as_ref().map(|term| term.bind(bindings)).transpose()?;
             let blocking = match blocking {
-                Some(said) if !instant => said,
+                Some(said) if instant.is_none() => said,
                 // How an instant action blocks is nothing a test is about.
-                said => usual_blocking(
-                    &action_type,
-                    said.unwrap_or_else(|| json!("HARD")),
-                    self.factsheet.as_deref(),
-                ),
+                said => {
+                    let usual = instant.map_or("HARD", |_| self.manners.blocking());
+                    let usual = said.unwrap_or_else(|| json!(usual));
+                    usual_blocking(&action_type, usual, self.factsheet.as_deref())
+                }
             };
-            all.push(json!({
-                "actionType": action_type,
-                "actionId": id,
-                "blockingType": blocking,
-                "actionParameters": parameters,
-            }));
+            let mut made = json!({ "actionType": action_type, "actionId": id, "blockingType": blocking });
+            if whole || !parameters.is_empty() {
+                made["actionParameters"] = Value::Array(parameters);
+            }
+            all.push(made);
             if let (Some(name), true) = (&action.name, fresh) {
                 named.push((name.clone(), id));
             }

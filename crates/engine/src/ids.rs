@@ -3,12 +3,30 @@
 //! They are readable, so that a person finds the test in a capture, unless the factsheet of the vehicle wants them short
 //! or of digits: FACT-12 binds the harness, too, while it plays the master control.
 
+use sha2::{Digest as _, Sha256};
+
 use tck_view::StringLimits;
 
 /// A vehicle that takes ids of this length takes the readable ones.
 const READABLE: u64 = 64;
 /// Digits of an id: six for the run, four for the test, two for the name.
 const DIGITS: usize = 12;
+
+/// An actionId in the form of a UUID, the same for the same run and number.
+pub(super) fn uuid_of_action(run: &str, number: u64) -> String {
+    let digest = Sha256::digest(format!("{run}/{number}"));
+    let digits: String = digest.iter().take(16).map(|byte| format!("{byte:02x}")).collect();
+    let part = |from: usize, to: usize| digits.get(from..to).unwrap_or_default();
+    // The digits that say which kind of UUID it is stand at their places.
+    format!(
+        "{}-{}-4{}-8{}-{}",
+        part(0, 8),
+        part(8, 12),
+        part(13, 16),
+        part(17, 20),
+        part(20, 32)
+    )
+}
 
 /// How ids are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -89,6 +107,21 @@ mod tests {
         }
         assert_eq!(IdForm::Readable.of_name("seed3", 7, "order", 0), "seed3-7-order");
         assert_eq!(IdForm::Readable.of_action("seed3", 9), "seed3-action-9");
+    }
+
+    #[test]
+    fn ids_in_the_form_of_a_uuid_are_the_same_again_and_differ() {
+        let first = uuid_of_action("seed3", 9);
+        let lengths: Vec<usize> = first.split('-').map(str::len).collect();
+        assert_eq!(lengths, [8, 4, 4, 4, 12]);
+        assert!(
+            first.bytes().all(|byte| byte == b'-' || byte.is_ascii_hexdigit()),
+            "{first}"
+        );
+        assert_eq!(&first[14..15], "4");
+        assert_eq!(first, uuid_of_action("seed3", 9));
+        assert_ne!(first, uuid_of_action("seed3", 10));
+        assert_ne!(first, uuid_of_action("seed4", 9));
     }
 
     #[test]

@@ -10,6 +10,7 @@ mod compose;
 mod compose_error;
 mod flood;
 mod ids;
+mod manner;
 mod map_file;
 mod operator;
 mod operator_steps;
@@ -25,6 +26,7 @@ use serde_json::{Map, Value, json};
 pub use compose::Composer;
 pub use compose_error::ComposeError;
 pub use ids::IdForm;
+pub use manner::{Manner, Manners};
 pub use operator::{Asks, HookOutcome, Operator};
 pub use recorder::{Onlooker, RecordError, Recorder};
 

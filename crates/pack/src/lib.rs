@@ -20,7 +20,7 @@ mod hooks_file;
 mod member_tree;
 mod participant;
 mod protocol;
-mod reader;
+pub mod reader;
 mod schema;
 mod shape;
 mod validator;

@@ -1,4 +1,5 @@
-//! Members of a file of data with what is wrong with them: for the catalogue of requirements and the vocabulary of hooks.
+//! Members of a file of data with what is wrong with them: for the catalogue of requirements, the vocabulary of hooks and
+//! counterparts.
 
 use serde::de::DeserializeOwned;
 
@@ -6,17 +7,20 @@ use tck_base::diagnostic::{Diagnostic, did_you_mean};
 use tck_base::yaml::Node;
 
 /// Reads members, and collects every mistake under one code.
-pub(super) struct Reader<'a> {
+pub struct Reader<'a> {
     code: &'static str,
     problems: &'a mut Vec<Diagnostic>,
 }
 
 impl<'a> Reader<'a> {
-    pub(super) fn new(code: &'static str, problems: &'a mut Vec<Diagnostic>) -> Self {
+    /// A reader that adds mistakes of this code.
+    #[must_use]
+    pub fn new(code: &'static str, problems: &'a mut Vec<Diagnostic>) -> Self {
         Self { code, problems }
     }
 
-    pub(super) fn member<'n>(&mut self, node: &'n Node, key: &str) -> Option<&'n Node> {
+    /// A member that has to be there.
+    pub fn member<'n>(&mut self, node: &'n Node, key: &str) -> Option<&'n Node> {
         let found = node.get(key);
         if found.is_none() {
             let title = format!("`{key}` is missing");
@@ -25,12 +29,14 @@ impl<'a> Reader<'a> {
         found
     }
 
-    pub(super) fn text(&mut self, node: &Node, key: &str) -> Option<String> {
+    /// A member that is a text and says something.
+    pub fn text(&mut self, node: &Node, key: &str) -> Option<String> {
         let member = self.member(node, key)?;
         self.as_text(member)
     }
 
-    pub(super) fn as_text(&mut self, node: &Node) -> Option<String> {
+    /// A text that says something.
+    pub fn as_text(&mut self, node: &Node) -> Option<String> {
         match node.text().map(str::trim) {
             Some(text) if !text.is_empty() => Some(text.to_owned()),
             Some(_) => {
@@ -45,7 +51,8 @@ impl<'a> Reader<'a> {
         }
     }
 
-    pub(super) fn list<'n>(&mut self, node: &'n Node, key: &str) -> Option<&'n [Node]> {
+    /// A member that is a list.
+    pub fn list<'n>(&mut self, node: &'n Node, key: &str) -> Option<&'n [Node]> {
         let member = self.member(node, key)?;
         if member.list().is_none() {
             self.wrong(member, "a list");
@@ -53,7 +60,8 @@ impl<'a> Reader<'a> {
         member.list()
     }
 
-    pub(super) fn choice<T: DeserializeOwned>(&mut self, node: &Node, key: &str, words: &[&str]) -> Option<T> {
+    /// A member that is one of these words.
+    pub fn choice<T: DeserializeOwned>(&mut self, node: &Node, key: &str, words: &[&str]) -> Option<T> {
         let member = self.member(node, key)?;
         let word = self.as_text(member)?;
         if !words.contains(&word.as_str()) {
@@ -69,7 +77,8 @@ impl<'a> Reader<'a> {
         serde_json::from_value(word.into()).ok()
     }
 
-    pub(super) fn known(&mut self, node: &Node, keys: &[&str]) {
+    /// Complains about members that are none of these.
+    pub fn known(&mut self, node: &Node, keys: &[&str]) {
         for (key, _) in node.map().unwrap_or_default() {
             let name = key.text().unwrap_or_default();
             if !keys.contains(&name) {
@@ -79,12 +88,14 @@ impl<'a> Reader<'a> {
         }
     }
 
-    pub(super) fn wrong(&mut self, node: &Node, due: &str) {
+    /// Complains about a value of another kind.
+    pub fn wrong(&mut self, node: &Node, due: &str) {
         let title = format!("{} where {due} is due", node.kind_word());
         self.problem(node, &title, "of another kind", &format!("write {due}"));
     }
 
-    pub(super) fn problem(&mut self, node: &Node, title: &str, label: &str, hint: &str) {
+    /// Adds a mistake at a place.
+    pub fn problem(&mut self, node: &Node, title: &str, label: &str, hint: &str) {
         self.problems
             .push(Diagnostic::new(self.code, node.span.clone(), title, label).hint(hint));
     }

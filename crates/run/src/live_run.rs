@@ -455,7 +455,7 @@ impl Stage<'_> {
             maps: self.maps,
         };
         let fleet = self.device.fleet.clone();
-        let composer = Composer::new(&self.request.run);
+        let composer = Composer::new(&self.request.run).in_manners(self.request.manners.clone());
         let (header, setup) = self.device.on(bench, self.request, self.library, self.pack);
         let header = Box::new(header);
         let first = Occurrence::harness(self.clock.now(), Event::RunBegun { header });

@@ -5,6 +5,7 @@ use std::time::Duration;
 use super::selection::{Criteria, Selection, SelectionError};
 use super::share::{share, share_vehicles};
 use tck_base::shard::ChosenShard;
+use tck_engine::Manners;
 use tck_journal::event::{DIVIDED_TESTS, DIVIDED_VEHICLES, ShardRecord};
 use tck_judge::Library;
 use tck_pack::{Pack, Role};
@@ -32,6 +33,8 @@ pub struct Request {
     pub limits: Vec<String>,
     /// Which part of a run it is.
     pub shard: Option<ShardRecord>,
+    /// How the harness words its messages.
+    pub manners: Manners,
 }
 
 impl Request {
@@ -229,6 +232,7 @@ impl RequestBuilder {
             certifies: self.certifies,
             limits: shard.iter().map(|shard| shard.limit(divided)).collect(),
             shard,
+            manners: Manners::default(),
         })
     }
 }

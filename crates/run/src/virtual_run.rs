@@ -9,7 +9,7 @@ use super::selection::Selection;
 use super::session::{Finished, Progress, run};
 use super::setup::{BenchFacts, DeviceUnderTest};
 use tck_base::clock::{Moment, Stamp};
-use tck_engine::{Composer, Engine, EngineError, HookOutcome, Operator, Recorder};
+use tck_engine::{Composer, Engine, EngineError, HookOutcome, Manners, Operator, Recorder};
 use tck_journal::event::{Event, Occurrence, Setting, ShardRecord};
 use tck_journal::file::JournalWriter;
 use tck_journal::{Journal, Reason, Vantage};
@@ -67,6 +67,8 @@ pub struct VirtualRun {
     pub limits: Vec<String>,
     /// Which part of a run it is.
     pub shard: Option<ShardRecord>,
+    /// How the harness words its messages.
+    pub manners: Manners,
 }
 
 impl VirtualRun {
@@ -102,6 +104,7 @@ impl VirtualRun {
             settings: Vec::new(),
             limits: Vec::new(),
             shard: None,
+            manners: Manners::default(),
         }
     }
 }
@@ -180,7 +183,7 @@ pub async fn run_virtually(
         limits: Vec::new(),
         maps: Ok(()),
     };
-    let composer = Composer::new(&request.run);
+    let composer = Composer::new(&request.run).in_manners(request.manners.clone());
     let asked = Request {
         tests: request.tests,
         draw: request.draw,
@@ -192,6 +195,7 @@ pub async fn run_virtually(
         certifies: request.certifies,
         limits: request.limits,
         shard: request.shard,
+        manners: request.manners,
     };
     let (header, setup) = tested.on(bench, asked, library, pack);
     let header = Box::new(header);

@@ -18,7 +18,6 @@ use tck_pack::Role;
 use tck_profile::TimeLimits;
 use tck_reference::Fault;
 use tck_reference::deviations::agv::Tolerance;
-use tck_reference::deviations::personas::mock;
 use tck_reference::deviations::{agv as vehicles, master_control as deviations};
 
 /// A built-in device under test.
@@ -220,7 +219,7 @@ impl BuiltIn {
     /// The mock AGVs, for a bench in memory.
     pub fn mock_peers(&self) -> impl Iterator<Item = Box<dyn Device>> {
         let vehicles = self.fleet().into_iter().flat_map(|fleet| &fleet.vehicles);
-        vehicles.map(|vehicle| Box::new(mock(vehicle.config.clone())) as Box<dyn Device>)
+        vehicles.map(|vehicle| Box::new(vehicles::mock(vehicle.config.clone())) as Box<dyn Device>)
     }
 }
 

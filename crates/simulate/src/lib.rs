@@ -6,6 +6,7 @@
 #![warn(missing_docs)]
 
 mod built_in;
+mod counterpart;
 pub mod driver;
 mod fetching;
 mod fleet;
@@ -18,6 +19,7 @@ mod unknown_name;
 mod witness;
 
 pub use built_in::BuiltIn;
+pub use counterpart::{Counterpart, Counterparts, Deviation, DeviationKind, Habit, Imitation};
 pub use fleet::{Fleet, Leavings, USUAL_FLEET, serial_number};
 pub use hook_server::HookServer;
 pub use reference_agv::{ReferenceAgv, Vehicle};

@@ -10,7 +10,7 @@ use tck_base::clock::WallClock;
 use tck_engine::{Asks, HookOutcome, Operator};
 use tck_net::bench::endpoint::Endpoint;
 use tck_net::link::mqtt::Reporter;
-use tck_reference::deviations::personas::mock;
+use tck_reference::deviations::agv::mock;
 
 /// How long a vehicle may take to sign off.
 const GOODBYE_LIMIT: Duration = Duration::from_secs(2);

@@ -68,6 +68,8 @@ pub enum Listing {
     Faults,
     /// Liberties the reference AGV can be given
     Tolerances,
+    /// Known products, and what each was seen to do
+    Counterparts,
     /// What a profile can do to the device for a test
     Hooks,
     /// What a test can ask of the mock vehicles, when a master control is tested

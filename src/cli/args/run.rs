@@ -90,6 +90,9 @@ pub struct Run {
     /// How many mock AGVs a master control is tested with [default: 2]
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=10_000), help_heading = "Master control")]
     pub vehicles: Option<u32>,
+    /// Let the harness behave like a known product, as far as permitted (`list counterparts`)
+    #[arg(long, value_name = "NAME")]
+    pub like: Option<String>,
     /// Run against the built-in device in memory and in virtual time, without a network
     #[arg(long = "virtual", help_heading = "Built-in device", conflicts_with_all = ["profile", "listen", "broker", "no_tap"])]
     pub in_virtual_time: bool,

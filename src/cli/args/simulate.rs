@@ -110,6 +110,9 @@ pub struct SimulatedAgv {
     /// Give it a liberty the standard leaves it; may be repeated (see `list tolerances`)
     #[arg(long, value_name = "NAME")]
     pub tolerance: Vec<String>,
+    /// Let it behave like a known product (see `list counterparts`)
+    #[arg(long, value_name = "NAME")]
+    pub like: Option<String>,
     /// Start with this behaviour (see `list vehicle`), with its parameters as a JSON object behind `=`; may
     /// be repeated
     #[arg(long, value_name = "WORD")]
@@ -161,6 +164,9 @@ pub struct SimulatedMasterControl {
     /// Give it a liberty the standard leaves it; may be repeated (see `list tolerances`)
     #[arg(long, value_name = "NAME")]
     pub tolerance: Vec<String>,
+    /// Let it behave like a known product (see `list counterparts`)
+    #[arg(long, value_name = "NAME")]
+    pub like: Option<String>,
 }
 
 /// A vehicle by its name.

@@ -18,6 +18,7 @@ use super::device::{check_faults, tolerate};
 use super::ending::Ending;
 use super::events::{About, Followed};
 use super::exit::Exit;
+use super::like::Harness;
 use super::outputs::Outputs;
 use super::page::{self, ServedPage};
 use super::problem::Problem;
@@ -28,6 +29,7 @@ use tck_base::clock::WallClock;
 use tck_base::diagnostic::{Diagnostic, Source, Span};
 use tck_base::secrets::Secrets;
 use tck_base::shard::{ChosenShard, Shard};
+use tck_journal::event::Setting;
 use tck_journal::file::JournalWriter;
 use tck_journal::{Reason, Vantage};
 use tck_judge::Library;
@@ -62,6 +64,8 @@ struct Job {
     earlier: Option<Earlier>,
     /// How many mock AGVs are asked for when a master control is tested.
     vehicles: Option<usize>,
+    /// How the harness behaves.
+    harness: Harness,
     /// Turns true when nobody waits any more for the run to end in good order.
     quit: Option<watch::Receiver<bool>>,
 }
@@ -104,7 +108,8 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
         let count = arguments.vehicles.map(|count| count as usize);
         wanted = wanted.vehicles(fleet_names(&effective.profile, count));
     }
-    let request = wanted.build(role, &library, &pack)?;
+    let mut request = wanted.build(role, &library, &pack)?;
+    let harness = Harness::of_run(arguments.like.as_deref(), role, &mut request)?;
     if role == Role::MasterControl && arguments.vehicle.0 != tck_simulate::Vehicle::default() {
         let title = "`--vehicle` is for the reference AGV, and a master control is tested here";
         return Err(Diagnostic::whole("usage", title).into());
@@ -127,6 +132,7 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
         no_motion: arguments.device.no_motion,
         certifies: arguments.certifies,
         vehicles: arguments.vehicles.map(|count| count as usize),
+        harness,
         earlier,
         quit: None,
     };
@@ -305,6 +311,8 @@ impl Job {
         };
         let mut run = LiveRun::of_profile(&self.effective, &self.library, &self.pack, surroundings, place)?;
         run.device.claims_add = !self.certifies;
+        self.harness.shape(run.device.fleet.as_mut());
+        run.device.settings.extend(self.harness.setting());
         Ok(run)
     }
 
@@ -316,7 +324,7 @@ impl Job {
     ) -> Result<Exit, Problem> {
         let device = self.built_in_device(arguments)?;
         let utc = WallClock::start().now().utc;
-        let settings = reference::settings(&Asked::of_run(arguments));
+        let settings = self.settings(arguments);
         self.is_resumable(&AboutRun {
             subject: device.subject(),
             vantage: Vantage::Tap.word(),
@@ -340,6 +348,7 @@ impl Job {
         run.repeat = self.request.repeat;
         run.budget = self.request.budget;
         run.limits.clone_from(&self.request.limits);
+        run.manners.clone_from(&self.request.manners);
         run.shard.clone_from(&self.request.shard);
         run.settings = settings;
         run.earlier = self.earlier.as_ref().map(|earlier| earlier.journal.clone());
@@ -369,7 +378,15 @@ impl Job {
             }
         };
         tolerate(&mut device, &arguments.tolerance)?;
+        self.harness.shape_built_in(&mut device);
         Ok(device)
+    }
+
+    /// What makes device and harness others than the usual ones, for the record.
+    fn settings(&self, arguments: &args::Run) -> Vec<Setting> {
+        let mut all = reference::settings(&Asked::of_run(arguments));
+        all.extend(self.harness.setting());
+        all
     }
 
     async fn built_in(
@@ -397,9 +414,7 @@ impl Job {
             };
         }
         run.device.settings.clone_from(&self.effective.settings);
-        run.device
-            .settings
-            .extend(reference::settings(&Asked::of_run(arguments)));
+        run.device.settings.extend(self.settings(arguments));
         self.over_sockets(run, interrupt, outputs).await
     }
 

@@ -59,6 +59,7 @@ pub(super) fn of_run(xml: &str, result: &RunResult, root: Option<&str>) -> Strin
         ("manufacturer", Some(&device.manufacturer)),
         ("serialNumber", Some(&device.serial_number)),
         ("firmwareVersion", result.setting("certificate.firmware-version")),
+        ("counterpart", result.setting("counterpart")),
         ("suites", Some(&result.suites_sha256)),
         ("shard", shard.as_deref()),
         ("shardOrigin", origin),

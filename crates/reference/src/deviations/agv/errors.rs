@@ -35,6 +35,11 @@ records! {
             reference.rename("referenceKey", "key");
             reference.rename("referenceValue", "value");
         }));
+    fault "references-in-snake-case" ["ORD-REJ-14", "ORD-CANCEL-20"] "It writes the keys of its error references in snake case, such as order_update_id."
+        => error(|_, _, m| m.each("errorReferences", |reference| {
+            let key = reference.text("referenceKey").to_owned();
+            reference.set("referenceKey", snake_case(&key));
+        }));
     fault "reference-value-numeric" ["ERR-05", "ORD-REJ-14"] "Gives numbers as reference values of errors."
         => error(|_, _, m| m.each("errorReferences", |reference| {
             if let Ok(number) = reference.text("referenceValue").parse::<u64>() {
@@ -46,4 +51,15 @@ records! {
 /// Whether the error refers to something by this key.
 fn refers(error: &ActiveError, key: &str) -> bool {
     error.references.iter().any(|(name, _)| name == key)
+}
+
+/// A word with an underscore and a small letter in the place of each capital one.
+fn snake_case(word: &str) -> String {
+    word.chars().fold(String::new(), |mut snake, letter| {
+        if letter.is_ascii_uppercase() {
+            snake.push('_');
+        }
+        snake.push(letter.to_ascii_lowercase());
+        snake
+    })
 }

@@ -69,6 +69,9 @@ records! {
     fault "timestamp-trailing-zeros-trimmed" ["HDR-03"] "It leaves out trailing zeros of the fraction of a second, so that one timestamp in ten has only one digit."
         because "The ruling of HDR-03 makes another number of digits of the fraction a warning."
         => header(|_, _, h| text(h, "timestamp", without_zeros));
+    fault "timestamp-milliseconds" ["HDR-03"] "Gives the fraction of a second with three digits."
+        because "The ruling of HDR-03 makes another number of digits of the fraction a warning."
+        => header(|agv, _, h| h.set("timestamp", format!("{:.3}", agv.now.utc)));
     fault "version-short" ["HDR-04"] "Gives the protocol version without the patch number."
         => header(|_, _, h| text(h, "version", |own| own.rsplit_once('.').map_or(own, |(short, _)| short).to_owned()));
     fault "factsheet-version-prefixed" ["HDR-04"] "The version in the header of its factsheet begins with the letter V."

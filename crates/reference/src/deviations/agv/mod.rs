@@ -131,16 +131,23 @@ pub fn built(config: AgvConfig, names: &[&str]) -> Result<Agv, UnknownFault> {
     if let Some(unknown) = names.iter().find(|name| RECORDS.fault(name).is_none()) {
         return Err(UnknownFault((*unknown).to_owned()));
     }
+    Ok(with(config, names))
+}
+
+/// A vehicle that can be told how to behave, with the tolerances of its configuration.
+#[must_use]
+pub fn mock(config: AgvConfig) -> Agv {
+    with(config, &[])
+}
+
+/// A reference AGV with these faults, as far as they are known.
+fn with(config: AgvConfig, faults: &[&str]) -> Agv {
     let tolerances = config.switched_on.clone();
     let mut agv = Agv::new(config);
-    for record in names
-        .iter()
-        .copied()
-        .chain(tolerances)
-        .filter_map(|name| RECORDS.find(name))
-    {
+    let names = faults.iter().copied().chain(tolerances);
+    for record in names.filter_map(|name| RECORDS.find(name)) {
         agv.switch_on((record.make)());
     }
     agv.switch_on(super::personas::persona());
-    Ok(agv)
+    agv
 }

@@ -77,6 +77,12 @@ records! {
         => every(|m| time(m, |text| text.replace('.', ",")));
     fault "timestamp-unix" ["HDR-03", "JSON-06"] "Gives timestamps as seconds since 1970."
         => sending(|site, _, out| out.message.set("timestamp", site.now.utc.as_second()));
+    fault "timestamp-milliseconds" ["HDR-03"] "Gives the fraction of a second with three digits."
+        because "The ruling of HDR-03 makes another number of digits of the fraction a warning."
+        => sending(|site, _, out| out.message.set("timestamp", format!("{:.3}", site.now.utc)));
+    fault "timestamp-nanoseconds" ["HDR-03"] "Gives the fraction of a second with nine digits, as the clock of its computer has them."
+        because "The ruling of HDR-03 makes another number of digits of the fraction a warning."
+        => sending(|site, _, out| out.message.set("timestamp", format!("{:.9}", site.now.utc)));
     fault "version-short" ["HDR-04"] "Gives the version without its last part."
         => every(|m| version(m, |text| text.rsplit_once('.').map_or(text, |(short, _)| short).to_owned()));
     fault "instant-action-version-two-numbers" ["HDR-04"] "It gives the version in instantActions messages as 2.1."
@@ -90,6 +96,8 @@ records! {
             out.message.set("manufacturer", site.config.name.clone());
             out.message.set("serialNumber", "1");
         });
+    fault "header-names-empty" ["HDR-05", "TOPIC-05", "TOPIC-06"] "It leaves manufacturer and serialNumber empty in the header."
+        => every(|m| for key in ["manufacturer", "serialNumber"] { m.set(key, ""); });
     fault "fleet-name-in-instant-action-header" ["HDR-05", "TOPIC-04"] "It writes its own name as manufacturer into the header of instantActions messages."
         => sending(|site, _, out| if out.name == "instantActions" { out.message.set("manufacturer", site.config.name.clone()); });
     fault "header-of-first-vehicle" ["HDR-05", "TOPIC-04"] "The header of messages to any vehicle names the first vehicle of the fleet."

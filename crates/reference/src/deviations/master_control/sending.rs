@@ -90,6 +90,15 @@ records! {
                 if let Some(cancel) = vehicle.cancel.as_mut().filter(|cancel| cancel.action_id == *id) { cancel.action_id = fresh; }
             }
         });
+    tolerance "cancel-repeated-until-it-ends" ["ORD-MSG-17", "IACT-02"]
+        "It sends cancelOrder again under the same actionId with every state that shows it and not its end."
+        => happening(|site, vehicle, event| if let Event::State(_) = event {
+            let Some(id) = vehicle.cancel.as_ref().map(|cancel| cancel.action_id.clone()) else { return };
+            let seen = vehicle.state.as_ref().and_then(|state| state.action(&id));
+            let runs = seen.is_some_and(|action| !action.is_terminal()) && site.commandable(vehicle);
+            let sent = vehicle.instants.iter().find(|instant| instant.id() == id).map(|instant| instant.action.clone());
+            if let Some(action) = sent.filter(|_| runs) { site.publish(vehicle, "instantActions", &json!({ "actions": [action] })); }
+        });
 }
 
 /// Changes a message that must not be changed.

@@ -28,14 +28,6 @@ pub use words::WORDS;
 /// No test waits longer than this.
 const LONGEST: f64 = 86_400.0;
 
-/// A vehicle that can be told how to behave.
-#[must_use]
-pub fn mock(config: AgvConfig) -> Agv {
-    let mut agv = Agv::new(config);
-    agv.switch_on(persona());
-    agv
-}
-
 /// What makes a vehicle listen to such words.
 pub(super) fn persona() -> Box<dyn Deviation> {
     Box::new(Persona::default())
