@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 use vda5050_tck::clock::{Moment, Stamp};
 use vda5050_tck::reference::agv::Agv;
-use vda5050_tck::reference::deviations::personas::mock;
+use vda5050_tck::reference::deviations::agv::mock;
 use vda5050_tck::reference::{Device, Input, Output};
 use vda5050_tck::simulate::ReferenceAgv;
 

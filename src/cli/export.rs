@@ -51,7 +51,7 @@ pub fn profile(folder: &Path) -> Result<Exit, Problem> {
         Some(settings) => settings,
         // Parts that were joined have a journal each, and their settings in common.
         None => {
-            json::read(&folder.join("result.json"))
+            result_file::read(&folder.join("result.json"))
                 .map_err(|error| Problem::from(Diagnostic::whole("result", error.to_string())))?
                 .settings
         }

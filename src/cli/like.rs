@@ -56,11 +56,9 @@ impl Harness {
 
     /// What the record of the run says.
     pub(super) fn setting(&self) -> Option<Setting> {
-        self.0.as_ref().map(|like| Setting {
-            name: SETTING.to_owned(),
-            value: like.name.clone(),
-            origin: "flag".to_owned(),
-        })
+        self.0
+            .as_ref()
+            .map(|like| Setting::shown(SETTING, like.name.as_str(), "flag"))
     }
 
     /// Lets the mock vehicles behave so.

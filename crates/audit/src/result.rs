@@ -1,5 +1,6 @@
 //! What an audit found, for programs.
 
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::Path;
 
@@ -353,8 +354,7 @@ impl SideResult {
         let is_finding = |finding: &FindingResult| matches!(finding.verdict, Verdict::Fail | Verdict::Warning);
         let (mut findings, information): (Vec<_>, Vec<_>) = found.into_iter().partition(is_finding);
         findings.sort_by(|one, other| {
-            let often = std::cmp::Reverse;
-            let key = |finding: &FindingResult| (often(finding.verdict), finding.message, often(finding.count));
+            let key = |finding: &FindingResult| (Reverse(finding.verdict), finding.message, Reverse(finding.count));
             key(one).cmp(&key(other))
         });
         let mut verdict: Accumulated = findings.iter().map(|finding| finding.verdict).collect();

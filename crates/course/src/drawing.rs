@@ -221,6 +221,7 @@ mod tests {
             deviation_xy: None,
             deviation_theta: None,
             station: false,
+            demands: Vec::new(),
         };
         let edge = |(start, end): &(&str, &str)| Edge {
             id: format!("{start}-{end}"),

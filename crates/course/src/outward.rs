@@ -133,6 +133,7 @@ mod tests {
             deviation_xy: None,
             deviation_theta: None,
             station: false,
+            demands: Vec::new(),
         };
         let edge = |number: usize| Edge {
             id: format!("e{number}"),

@@ -244,9 +244,11 @@ const DIMENSIONS_OF_COMMANDS: [(&str, &[&str]); 4] = [
 #[test]
 fn every_dimension_of_oddness_is_drawn() {
     let library = tck_testing::library();
-    let sides: [(Role, &[(&str, &[&str])]); 2] =
-        [(Role::Agv, &DIMENSIONS), (Role::MasterControl, &DIMENSIONS_OF_COMMANDS)];
-    for (role, dimensions) in sides {
+    for role in [Role::Agv, Role::MasterControl] {
+        let dimensions = match role {
+            Role::Agv => &DIMENSIONS[..],
+            Role::MasterControl => &DIMENSIONS_OF_COMMANDS[..],
+        };
         let grammar = grammar(library, library.rules.packs.latest(), role);
         let exploration = exploration(grammar.clone(), 1, 400);
         let drawn = exploration.drawn(&grammar, &mut Coverage::default());

@@ -314,6 +314,7 @@ impl Taken<'_> {
             name: format!("keys.{id}"),
             value: key.clone(),
             origin: origin.to_string(),
+            written: Some(written::issue_key(id, key)),
         }));
         settings.extend(self.layer.hooks.iter().map(|(name, (hook, origin))| {
             Setting {

@@ -12,7 +12,7 @@ use super::{LayoutList, SampleAction, Setting, VehicleGroup, time};
 use tck_base::secrets::Secrets;
 
 /// The sections with one value for each name, in the order of a profile.
-const SECTIONS: [&str; 10] = [
+const SECTIONS: [&str; 11] = [
     "device",
     "bench",
     "motion",
@@ -23,6 +23,7 @@ const SECTIONS: [&str; 10] = [
     "certificate",
     "deviations",
     "known",
+    "keys",
 ];
 /// The section of what can be done to the device.
 const HOOKS: &str = "hooks";
@@ -141,6 +142,11 @@ pub(super) fn others(groups: &[VehicleGroup]) -> String {
 /// A line of `[deviations]`.
 pub(super) fn deviation(requirement: &str, reason: &str) -> String {
     format!("{} = {}", key(requirement), quoted(reason))
+}
+
+/// What test management calls a requirement, test or monitor.
+pub(super) fn issue_key(id: &str, text: &str) -> String {
+    format!("{} = {}", key(id), quoted(text))
 }
 
 /// A line of `[known]`.

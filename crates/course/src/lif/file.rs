@@ -3,13 +3,12 @@
 use std::collections::BTreeMap;
 
 use serde::Deserialize;
-use serde::de::IgnoredAny;
 use serde_json::Value;
 
 use crate::demand::Demand;
 
 /// Members with a name that nothing here knows.
-type Unknown = BTreeMap<String, IgnoredAny>;
+type Unknown = BTreeMap<String, Value>;
 
 /// Members that say nothing about driving, beside those whose names end like names for people.
 const NOT_FOR_DRIVING: [&str; 2] = ["layoutVersion", "layoutLevelId"];
@@ -88,13 +87,14 @@ struct RobotType {
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Action {
-    action_type: String,
+    #[serde(rename = "actionType")]
+    name: String,
     requirement_type: Option<String>,
     /// What a draft of LIF 2 has in the place of `requirementType`.
     required: Option<bool>,
     blocking_type: Option<String>,
-    #[serde(default)]
-    action_parameters: Vec<Parameter>,
+    #[serde(default, rename = "actionParameters")]
+    parameters: Vec<Parameter>,
 }
 
 #[derive(Deserialize)]
@@ -285,9 +285,9 @@ fn actions(mixed: &[Action], required: &[Action], feasible: &[Action]) -> Vec<(R
 
 impl Action {
     fn demand(&self) -> Demand {
-        let parameters = self.action_parameters.iter();
+        let parameters = self.parameters.iter();
         Demand {
-            action_type: self.action_type.clone(),
+            action_type: self.name.clone(),
             blocking: match self.blocking_type.as_deref() {
                 // The draft of LIF 2 itself says so for VDA 5050 up to 2.1.
                 None | Some("SINGLE") => "HARD".to_owned(),

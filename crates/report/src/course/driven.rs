@@ -73,7 +73,7 @@ pub struct Driven {
     now: Moment,
     /// Whether it ever says where it is; one that never does is followed by its last nodes.
     has_position: bool,
-    has_driven: bool,
+    has_left: bool,
     watched: BTreeMap<u64, Option<Moment>>,
 }
 
@@ -89,7 +89,7 @@ impl Driven {
             trails: BTreeMap::new(),
             now: Moment::default(),
             has_position: false,
-            has_driven: false,
+            has_left: false,
             watched: BTreeMap::new(),
         }
     }
@@ -146,7 +146,7 @@ impl Driven {
             route.message
         });
         self.now.driving = state.driving.flag();
-        self.has_driven |= self.now.driving == Some(true);
+        self.has_left |= self.now.driving == Some(true);
         if let Some(place) = state.position.there().and_then(place) {
             self.has_position = true;
             self.is_at(number, place);
@@ -177,7 +177,7 @@ impl Driven {
             let first = trail.known().next();
             first.is_some_and(|(x, y, _)| trail.known().any(|(to_x, to_y, _)| (to_x - x).hypot(to_y - y) >= MOVED))
         };
-        self.has_driven || self.trails.len() > 1 || self.trails.values().any(went)
+        self.has_left || self.trails.len() > 1 || self.trails.values().any(went)
     }
 
     /// What was known at a message: exactly where it was watched, else as near as the trail has it.
@@ -232,8 +232,9 @@ impl Driven {
         let mut found: Vec<(u64, Vec<String>)> = Vec::new();
         let mut further = 0;
         for finding in findings {
-            match found.iter_mut().find(|(number, _)| *number == finding.number) {
-                Some((_, what)) => what.push(finding.what.clone()),
+            let known = found.iter().position(|(number, _)| *number == finding.number);
+            match known {
+                Some(at) => found[at].1.push(finding.what.clone()),
                 None if found.len() < FOUND => found.push((finding.number, vec![finding.what.clone()])),
                 None => further += 1,
             }

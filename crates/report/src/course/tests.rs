@@ -140,7 +140,7 @@ fn an_update_goes_on_with_the_base_before_it_and_replaces_the_horizon() {
 fn a_curve_is_a_curve() {
     let mut driven = Driven::new(Bounds::TEST);
     let quarter = json!({ "degree": 2, "knotVector": [0, 0, 0, 1, 1, 1], "controlPoints": [
-        { "x": 0, "y": 0 }, { "x": 2, "y": 0, "weight": 0.707_106 }, { "x": 2, "y": 2 },
+        { "x": 0, "y": 0 }, { "x": 2, "y": 0, "weight": 0.7 }, { "x": 2, "y": 2 },
     ] });
     let broken = json!({ "degree": 0, "knotVector": [], "controlPoints": [] });
     let node = |id: &str, at: u64, x: f64, y: f64| json!({ "nodeId": id, "sequenceId": at, "released": true, "nodePosition": { "x": x, "y": y, "mapId": "hall" } });
