@@ -20,8 +20,8 @@ use tck_journal::place;
 use tck_judge::Library;
 use tck_pack::{Catalogue, Role};
 use tck_profile as profile;
-use tck_report::json as result_file;
 use tck_report::statement::many;
+use tck_report::{clean, json as result_file};
 
 /// A file that is read as a whole may have so many bytes.
 const WHOLE: usize = 32 << 20;
@@ -72,7 +72,7 @@ pub fn validate(arguments: &Validate) -> Result<Exit, Problem> {
             ))?,
             (Found::Doubtful(what, doubts), Format::Text) => {
                 for doubt in doubts {
-                    super::print(&format!("{name}: WARN {doubt}\n"))?;
+                    super::print(&format!("{name}: WARN {}\n", clean::line(&doubt)))?;
                 }
                 super::print(&format!("{name}: {what}\n"))?
             }

@@ -267,6 +267,10 @@ impl Taken<'_> {
                     value: setter.value.shown(),
                     origin: setter.origin.to_string(),
                     written: made(&setter.origin).and_then(|()| {
+                        // Its arguments may hold a password.
+                        if key.path == "device.command" {
+                            return None;
+                        }
                         let name = key.path.split('.').next_back()?;
                         written::line(name, &setter.value)
                     }),

@@ -42,7 +42,7 @@ pub struct Evidence<'a> {
     pub episodes: BTreeSet<usize>,
     /// The test from which on it was seen more often than is known.
     pub more_from: Option<usize>,
-    /// The first message that shows it, where messages alone say what came first.
+    /// The first message that shows it, where messages alone say what belongs together.
     pub first: Option<u64>,
     /// Whether tests have decided the requirement, and it was kept in none.
     pub never_kept: bool,
@@ -114,8 +114,10 @@ fn is_same(finding: &Evidence<'_>, other: &Evidence<'_>) -> bool {
 fn rests(finding: &Evidence<'_>, other: &Evidence<'_>) -> bool {
     let may_be_in = |test: &usize| other.episodes.contains(test) || other.more_from.is_some_and(|from| from <= *test);
     let is_there = || other.never_kept || finding.episodes.iter().all(may_be_in);
-    let is_later = finding.first.zip(other.first).is_none_or(|(own, first)| first <= own);
-    finding.rests_on.contains(&other.requirement) && other.verdict >= finding.verdict && is_later && is_there()
+    // What comes later in a recording may be a mistake of its own.
+    let at_once = |(own, first): (u64, u64)| own == first && finding.count <= other.count;
+    let is_at_once = finding.first.zip(other.first).is_none_or(at_once);
+    finding.rests_on.contains(&other.requirement) && other.verdict >= finding.verdict && is_at_once && is_there()
 }
 
 /// The place in a message that a sentence begins with, such as `state/orderId`; the whole sentence where it begins otherwise. Two

@@ -232,7 +232,7 @@ impl Package<'_> {
             ),
             (
                 "settings.json",
-                "the profile as it took effect, each setting with its origin; no passwords",
+                "the profile as it took effect, each setting with its origin; no password of a broker, but the command of the device as it was given",
             ),
             (
                 "attestation.json",

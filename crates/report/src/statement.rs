@@ -399,6 +399,13 @@ fn anything_failed(result: &RunResult) -> bool {
     !program_failed(result) || tests(result).fail > 0 || monitors(result).fail > 0
 }
 
+/// Whether requirements were left undecided since their tests were not selected.
+#[must_use]
+pub fn is_selection(result: &RunResult) -> bool {
+    let mut all = result.requirements.iter();
+    all.any(|requirement| requirement.not_decided == Some(NotDecided::NotSelected))
+}
+
 /// Why nobody may take a run for a green one, whatever stands in its tests: it ended early, or decided nothing of what was
 /// selected.
 #[must_use]

@@ -198,7 +198,7 @@ impl RequestBuilder {
         };
         let shard = match (&self.shard, &self.vehicles) {
             (Some(chosen), Some(vehicles)) => Some(share_vehicles(&tests, chosen, vehicles)),
-            (Some(chosen), None) => Some(share(&mut tests, chosen, draw.is_some())),
+            (Some(chosen), None) => Some(share(&mut tests, chosen, draw)),
             (None, _) => self.part,
         };
         if let (Some(ShardRecord { index, of, filled, .. }), Some(_)) = (&shard, &self.vehicles)

@@ -20,7 +20,8 @@ const AROUND: Duration = Duration::from_millis(500);
 
 /// Keeps one part of the tests. What is drawn from a table depends on all of its cases, so that a table stays whole where there is
 /// a draw.
-pub(super) fn share(tests: &mut Selection, chosen: &ChosenShard, is_drawn: bool) -> ShardRecord {
+pub(super) fn share(tests: &mut Selection, chosen: &ChosenShard, draw: Option<u64>) -> ShardRecord {
+    let is_drawn = draw.is_some();
     let time = Value::Object(TimeLimits::default().bindings());
     let estimate = Estimate::of(Some(&time), None, None, Duration::from_secs(1));
     let mut sums: BTreeMap<&str, (Duration, u32, u32)> = BTreeMap::new();
@@ -42,9 +43,16 @@ pub(super) fn share(tests: &mut Selection, chosen: &ChosenShard, is_drawn: bool)
     });
     let pieces: Vec<Piece> = pieces.collect();
     let parts = divided(&pieces, chosen.shard.of);
-    let names: Vec<&str> = tests.iter().map(|test| test.id.as_str()).collect();
-    let record = ShardRecord::of(chosen, chosen.shard.of.min(pieces.len()), &names);
     let own: BTreeMap<&str, usize> = pieces.iter().map(|piece| piece.name.as_str()).zip(parts).collect();
+    // Parts that were divided or drawn otherwise are no parts of one whole.
+    let drawn = draw.map_or_else(String::new, |draw| draw.to_string());
+    let names = tests.iter().map(|test| {
+        let part = own.get(piece(test, is_drawn)).copied().unwrap_or_default();
+        format!("{} {part} {drawn}", test.id)
+    });
+    let names: Vec<String> = names.collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let record = ShardRecord::of(chosen, chosen.shard.of.min(pieces.len()), &names);
     tests.retain(|test| own.get(piece(test, is_drawn)) == Some(&chosen.shard.index));
     record
 }
