@@ -104,7 +104,8 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
         None => None,
     };
     let mut wanted = asked(arguments, part, earlier.as_ref());
-    if role == Role::MasterControl && !built_in {
+    // A master control that the run starts itself is one of several, and one that is there is shared.
+    if role == Role::MasterControl && !built_in && effective.profile.device.command.is_none() {
         let count = arguments.vehicles.map(|count| count as usize);
         wanted = wanted.vehicles(fleet_names(&effective.profile, count));
     }
