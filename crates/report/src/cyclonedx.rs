@@ -136,7 +136,7 @@ impl Row<'_> {
     }
 
     fn reference(&self, what: &str) -> String {
-        format!("{what}:{}", self.requirement.id)
+        format!("{what}:{}", line(&self.requirement.id))
     }
 
     /// The requirement itself.
