@@ -308,6 +308,7 @@ impl Job {
                 .request
                 .shard
                 .as_ref()
+                .filter(|_| self.effective.profile.device.command.is_none())
                 .and_then(|own| Shard::new(own.index, own.of)),
         };
         let mut run = LiveRun::of_profile(&self.effective, &self.library, &self.pack, surroundings, place)?;

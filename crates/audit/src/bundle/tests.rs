@@ -75,7 +75,7 @@ fn the_page_shows_each_vehicle_over_time_and_what_a_vehicle_says_is_only_text() 
     let drawn = &saved.vehicles[0].courses;
     // Numbers may lose their last binary digit on the way.
     let orders = |all: &[CoursePicture]| all.iter().map(|one| one.order.clone()).collect::<Vec<_>>();
-    assert!(!drawn.is_empty());
+    assert!(!drawn.is_empty(), "{:#?}", result.vehicles[0].sides);
     assert_eq!(orders(drawn), orders(&result.vehicles[0].courses));
     assert_eq!(page.matches("class=\"course\"").count(), drawn.len());
     assert!(
