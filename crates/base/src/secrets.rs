@@ -79,6 +79,12 @@ fn address(word: &str) -> String {
         Some((_, host)) => ("…@", host),
         None => ("", host),
     };
+    // Several addresses may stand in one word.
+    let rest = format!("{host}{path}");
+    let query_begins = rest.find(['?', '#']).unwrap_or(rest.len());
+    if rest[..query_begins].contains("://") {
+        return format!("{scheme}://{user}{}", address(&rest));
+    }
     let path = match path.find(['?', '#']) {
         Some(query) => format!("{}?{HIDDEN}{}", &path[..query], trailing(path)),
         None => path.to_owned(),
@@ -114,6 +120,8 @@ mod tests {
             ("POST https://host/a?token=SECRET: 204", "POST https://host/a?…: 204"),
             ("--broker=wss://host/mqtt?x=SECRET", "--broker=wss://host/mqtt?…"),
             ("http://host/a#SECRET", "http://host/a?…"),
+            ("mqtt://a:SECRET@h1,mqtt://b:SECRET@h2", "mqtt://…@h1,mqtt://…@h2"),
+            ("ws://h1/x|wss://b:SECRET@h2/y?z=SECRET", "ws://h1/x|wss://…@h2/y?…"),
             ("https://host?key=SECRET", "https://host?…"),
             ("\"ws://host/mqtt?x=SECRET\",\nnext", "\"ws://host/mqtt?…\",\nnext"),
             ("mqtt://host:1883 and no address", "mqtt://host:1883 and no address"),

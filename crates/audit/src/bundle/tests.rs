@@ -10,7 +10,13 @@ use tck_report::course::CoursePicture;
 fn the_page_shows_each_vehicle_over_time_and_what_a_vehicle_says_is_only_text() {
     let library = tck_testing::library();
     let pack = library.rules.packs.latest();
-    let mut messages = traffic(library, pack, Role::Agv, "order-acceptance/base-and-horizon", &["horizon-not-reported"]);
+    let mut messages = traffic(
+        library,
+        pack,
+        Role::Agv,
+        "order-acceptance/base-and-horizon",
+        &["horizon-not-reported"],
+    );
     for message in &mut messages {
         let text = String::from_utf8_lossy(&message.payload).replace("\"AUTOMATIC\"", "\"<script>AUTO\"");
         message.payload = text.into_bytes().into();
