@@ -148,6 +148,7 @@ records! {
     fault "charge-missing" ["STATE-MSG-15", "JSON-10"] "Leaves the charge out of its battery state."
         => state(|_, m| m.part("batteryState", |b| b.unset("batteryCharge")));
     fault "charge-as-a-share" ["STATE-MSG-15"] "Gives its charge as a share of one."
+        because "A charge of at most one percent is possible, so that it is no more than remarked."
         => state(|_, m| m.part("batteryState", |b| b.change("batteryCharge", |charge| *charge = json!(charge.as_f64().unwrap_or_default() / 100.0))));
     fault "charge-good-bad" ["STATE-MSG-16"] "Knows good and bad charge only, and calls them 100 and 0 percent."
         => state(|agv, m| m.part("batteryState", |b| b.set("batteryCharge", if agv.motion.is_moving() { 0.0 } else { 100.0 })));
