@@ -19,7 +19,8 @@ use super::difference::Difference;
 const LIMIT: Duration = Duration::from_secs(5);
 /// How long what is stored may come after what was published behind the subscription.
 const BEHIND: Duration = Duration::from_millis(500);
-/// How often it is looked whether a message is stored at another node, which may learn of it a little later.
+/// How often another node is asked: it may learn of a stored message a little later, and may end a connection while the nodes wait
+/// for each other.
 const LOOKS: u32 = 3;
 
 /// What a self-test found out.
@@ -131,7 +132,9 @@ async fn check(
     orderly.client.disconnect().await;
     let gone = Tester::connect((endpoint, own), "gone", Some(message(&topic, "gone", 1, true)), vec![]).await?;
     drop(gone);
-    let will = watcher.message("the last will of a connection that broke off").await?;
+    let will = watcher
+        .message_on(&topic, "the last will of a connection that broke off")
+        .await?;
     if will.payload != "gone" {
         return Err(broken(endpoint, "a last will is published after DISCONNECT"));
     }
@@ -172,7 +175,7 @@ async fn stored(
     let subscriptions = vec![(format!("{base}/{filter}"), 2), (end.clone(), 2)];
     let mut fresh = Tester::connect(at, "fresh", None, subscriptions).await?;
     watcher.publish(message(&end, "x", 1, false))?;
-    watcher.message("a message of its own").await?;
+    watcher.message_on(&end, "a message of its own").await?;
     let mut limit = LIMIT;
     let found = loop {
         match fresh.within(limit).await? {
@@ -192,19 +195,28 @@ async fn elsewhere(
     watcher: &mut Tester<'_>,
     base: &str,
 ) -> Result<Option<Difference>, LinkError> {
-    let sender = Tester::connect((node, own), "sender", None, vec![]).await?;
-    sender.publish(message(&format!("{base}/elsewhere"), "x", 1, false))?;
-    watcher
-        .message(&format!("a message published at {}", node.url()))
-        .await?;
-    sender.client.disconnect().await;
-    for _ in 0..LOOKS {
-        let found = stored((node, own), watcher, base, "retained").await?;
-        if found.is_some_and(|got| got.payload == "new") {
-            return Ok(None);
+    let mut left = LOOKS;
+    loop {
+        left -= 1;
+        match look((node, own), watcher, base).await {
+            Ok(true) => return Ok(None),
+            Ok(false) if left == 0 => return Ok(Some(Difference::KeepsFromNode(node.url()))),
+            Err(error) if left == 0 => return Err(error),
+            Ok(false) | Err(_) => {}
         }
     }
-    Ok(Some(Difference::KeepsFromNode(node.url())))
+}
+
+/// Whether what is published at another node arrives, and what is stored is known there.
+async fn look((node, own): (&Endpoint, &OwnNames), watcher: &mut Tester<'_>, base: &str) -> Result<bool, LinkError> {
+    let topic = format!("{base}/elsewhere");
+    let sender = Tester::connect((node, own), "sender", None, vec![]).await?;
+    sender.publish(message(&topic, "x", 1, false))?;
+    let what = format!("a message published at {}", node.url());
+    watcher.message_on(&topic, &what).await?;
+    sender.client.disconnect().await;
+    let found = stored((node, own), watcher, base, "retained").await?;
+    Ok(found.is_some_and(|got| got.payload == "new"))
 }
 
 struct Tester<'a> {
@@ -303,6 +315,16 @@ impl<'a> Tester<'a> {
                 self.endpoint,
                 &format!("it ends the connection where {what} should arrive ({reason})"),
             )),
+        }
+    }
+
+    /// The next message on a topic; what is late of others is passed over.
+    async fn message_on(&mut self, topic: &str, what: &str) -> Result<Got, LinkError> {
+        loop {
+            let got = self.message(what).await?;
+            if got.topic == topic {
+                return Ok(got);
+            }
         }
     }
 
