@@ -48,12 +48,14 @@ fn the_bundle_of_a_run_says_what_its_device_has_to_change() {
         );
     }
     let whole = json(&bench.run(&[&asked[..], &["--format", "json"]].concat()).code(0));
-    assert_eq!((&whole["role"], &whole["from"]), (&"agv".into(), &"2.1.0".into()));
+    assert_eq!(whole["role"], "agv");
+    assert_eq!(whole["from"], "2.1.0");
     assert!(whole["messages"].as_u64().unwrap() > 0 && whole["recordings"][0]["sha256"].is_string());
     let rows = whole["requirements"].as_array().unwrap();
     let row = |id: &str| rows.iter().find(|row| row["id"] == id).unwrap();
     let lists = row("IACT-STATE-08");
-    assert_eq!((&lists["change"], &lists["then"]), (&"new".into(), &"fail".into()));
+    assert_eq!(lists["change"], "new");
+    assert_eq!(lists["then"], "fail");
     assert!(
         lists["monitors"]
             .as_array()
@@ -78,9 +80,10 @@ fn of_a_recording_one_device_is_meant() {
         .code(2)
         .says("the recording has 2 vehicles")
         .says("--vehicle");
-    let one = |more: &[&str]| run(&[&["migrate", &site, "--format", "json"], more].concat());
+    let one = |more: &[&str]| run(&[&["migrate", &site, "--format", "json"][..], more].concat());
     let older = json(&one(&["--vehicle", "mock-0", "--to", "2.1"]).code(0));
-    assert_eq!((&older["from"], &older["to"]), (&"2.0.0".into(), &"2.1.0".into()));
+    assert_eq!(older["from"], "2.0.0");
+    assert_eq!(older["to"], "2.1.0");
     assert_eq!(older["device"], "vda5050-tck/mock-0");
     one(&["--vehicle", "mock-1", "--to", "2.1"])
         .code(2)
