@@ -435,7 +435,11 @@ fn about_requirement(requirement: &Requirement, library: &Library, pack: &Pack) 
         let _ = writeln!(text, "or else        {otherwise}");
     }
     if !requirement.rests_on.is_empty() {
-        let ids: Vec<&str> = requirement.rests_on.iter().map(|id| id.as_str()).collect();
+        let ids: Vec<&str> = requirement
+            .rests_on
+            .iter()
+            .map(tck_pack::RequirementId::as_str)
+            .collect();
         let _ = writeln!(text, "rests on       {}", ids.join(", "));
     }
     let _ = writeln!(text, "decided        {}", requirement.decided.word());

@@ -56,12 +56,17 @@ fn secured(folder: &Path) -> String {
 
 /// Runs a test against a vehicle at the tap, in front of this broker.
 fn judged(bench: &Bench, broker: &str, more: &str, password: &str) -> Running {
+    judged_by(QUICK, bench, broker, more, password)
+}
+
+/// Runs these tests against a vehicle at the tap, in front of this broker.
+fn judged_by(tests: &str, bench: &Bench, broker: &str, more: &str, password: &str) -> Running {
     let profile = Profile {
         bench: format!("broker = \"{broker}\"\n{more}"),
         ..Profile::default()
     };
     std::fs::write(bench.path().join("device.toml"), profile.text()).unwrap();
-    let mut command = tool(bench.path(), &["run", "--profile", "device.toml", QUICK]);
+    let mut command = tool(bench.path(), &["run", "--profile", "device.toml", tests]);
     command.env("VDA5050_TCK_PASSWORD", password);
     Running::start(&mut command)
 }
@@ -72,7 +77,12 @@ fn refused(broker: &str, more: &str, password: &str) -> Ended {
 
 /// Starts a run with these settings of the bench, and a vehicle at its address.
 fn with_vehicle(bench: &Bench, broker: &str, more: &str, user: Option<&str>) -> (Running, Running) {
-    let mut run = judged(bench, broker, more, "right-password");
+    with_vehicle_for(QUICK, bench, broker, more, user)
+}
+
+/// Starts a run of these tests with these settings of the bench, and a vehicle at its address.
+fn with_vehicle_for(tests: &str, bench: &Bench, broker: &str, more: &str, user: Option<&str>) -> (Running, Running) {
+    let mut run = judged_by(tests, bench, broker, more, "right-password");
     let address = run.line("the device is expected at mqtt://");
     let broker = format!("mqtt://{address}");
     let mut arguments = vec!["simulate", "agv", "--broker", &broker];
@@ -422,7 +432,8 @@ fn a_vehicle_that_dies_is_named_where_no_tap_sees_it_go() {
         return;
     };
     let bench = Bench::new();
-    let (mut run, mut agv) = with_vehicle(&bench, &broker.url(), "tap = false\n", None);
+    // Enough tests that the vehicle is gone before they are over.
+    let (mut run, mut agv) = with_vehicle_for("order-rejection/*", &bench, &broker.url(), "tap = false\n", None);
     run.line("estimated time");
     agv.kill();
     run.line("the device is gone since #");

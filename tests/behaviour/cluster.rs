@@ -183,7 +183,7 @@ impl Cluster {
     }
 }
 
-/// Whether a broker accepts a client: a CONNECT with a clean session is answered by a CONNACK of success.
+/// Whether a broker accepts a client and what it subscribes to with QoS 1: nodes that do not know each other yet refuse that.
 fn lets_in(port: u16) -> bool {
     let name = format!("{:08x}", std::process::id());
     let id = &name.as_bytes()[..8];
@@ -195,8 +195,14 @@ fn lets_in(port: u16) -> bool {
         socket.write_all(&connect)?;
         let mut answer = [0; 4];
         socket.read_exact(&mut answer)?;
+        if answer != [0x20, 2, 0, 0] {
+            return Ok(false);
+        }
+        socket.write_all(&[0x82, 10, 0, 1, 0, 5, b'r', b'e', b'a', b'd', b'y', 1])?;
+        let mut granted = [0; 5];
+        socket.read_exact(&mut granted)?;
         socket.write_all(&[0xe0, 0])?;
-        Ok::<_, std::io::Error>(answer == [0x20, 2, 0, 0])
+        Ok::<_, std::io::Error>(granted == [0x90, 3, 0, 1, 1])
     };
     ask().unwrap_or(false)
 }

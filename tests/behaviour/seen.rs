@@ -114,7 +114,7 @@ fn the_profile_of_a_run_is_run_again() {
     let shown = bench.bundle().display().to_string();
     let once_more = bench.run(&["report", &shown, "--profile"]).code(0).stdout;
     let values = |text: &str| -> Vec<String> {
-        let lines = text.lines().filter(|line| !line.starts_with('#'));
+        let lines = text.trim_end().lines().filter(|line| !line.starts_with('#'));
         lines.map(str::to_owned).collect()
     };
     assert_eq!(values(&once_more), values(&written));

@@ -307,7 +307,7 @@ pub struct HintResult {
 pub struct CauseResult {
     /// The finding.
     pub finding: usize,
-    /// The same thing, found as a breach of another requirement or by another monitor.
+    /// This thing, found as a breach of another requirement or by another monitor.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub same: Vec<usize>,
     /// What rests on what it breaks.

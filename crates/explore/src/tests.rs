@@ -168,7 +168,6 @@ const DIMENSIONS: [(&str, &[&str]); 9] = [
         "quantity",
         &[
             "order-long-horizon",
-            "order-far-planned",
             "order-with-many-actions",
             "plan-shorter-and-longer",
             "ask-many",
@@ -224,7 +223,7 @@ const DIMENSIONS: [(&str, &[&str]); 9] = [
     ),
 ];
 
-/// The same for a master control.
+/// Ways in which a master control meets the unusual, and stimuli that bring them about.
 const DIMENSIONS_OF_COMMANDS: [(&str, &[&str]); 4] = [
     (
         "limits alone and in pairs",

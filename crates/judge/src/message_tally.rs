@@ -369,7 +369,7 @@ mod tests {
         let pick = of("pick").expect("an action");
         assert_eq!(
             (pick.predefined, pick.declared, pick.sent, pick.reported),
-            (true, 0, 1, 1)
+            (true, 0, 1, 2)
         );
         let own = of(&"x".repeat(LENGTH)).expect("an action");
         assert_eq!((own.predefined, own.declared), (false, 1));

@@ -106,9 +106,9 @@ impl File {
                 "in this file",
             )]);
         }
-        let format = if major == Some("2") { "2" } else { "1.0" };
+        let format = if major == Some("2") { "LIF 2" } else { "LIF 1.0" };
         let no_layout = |span: Span, label: &str| {
-            let title = format!("this is not a layout in the format LIF {format}");
+            let title = format!("this is not a layout in the format {format}");
             vec![Diagnostic::new("lif", span, title, label)]
         };
         let file: Self = serde_json::from_str(&source.text).map_err(|error| {
