@@ -28,6 +28,7 @@ mod log;
 mod merge;
 mod message_stream;
 mod messages;
+mod migrate;
 mod outputs;
 mod page;
 mod pipeline;
@@ -109,6 +110,7 @@ fn dispatch(cli: &Cli, outputs: &outputs::Outputs<'_>) -> Result<Exit, Problem> 
         Command::Explain(arguments) => list::explain(arguments),
         Command::Audit(arguments) => audit::audit(arguments),
         Command::Watch(arguments) => watch::watch(arguments),
+        Command::Migrate(arguments) => migrate::migrate(arguments),
         Command::Explore(arguments) => explore::explore(arguments),
         Command::Validate(arguments) => validate::validate(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),

@@ -30,6 +30,7 @@ mod inspecting;
 mod interrupted;
 mod layouts;
 mod messages_only;
+mod migrating;
 mod mosquitto;
 mod output;
 mod overhearing;

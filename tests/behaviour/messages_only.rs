@@ -4,7 +4,8 @@ use std::fs;
 
 use serde_json::{Value, json};
 
-use crate::bench::Bench;
+use crate::bench::{Bench, MANUFACTURER, Profile, QUICK, SERIAL};
+use crate::scripted::Scripted;
 use crate::tool::{run, run_in};
 
 /// The version.
@@ -260,4 +261,29 @@ fn what_became_of_requirements_is_listed_with_both_sentences() {
     run(&["list", "tests", "--changes", "2.1..3.0"])
         .code(2)
         .says("list requirements");
+}
+
+#[test]
+fn a_device_that_speaks_it_and_is_judged_by_another_version_is_told_so_in_one_sentence() {
+    let bench = Bench::new();
+    let mut state = good("state-idle");
+    state["manufacturer"] = MANUFACTURER.into();
+    state["serialNumber"] = SERIAL.into();
+    let (run, port) = bench.start(&Profile::default(), &[QUICK]);
+    let mut device = Scripted::online(port);
+    device.publish("state", state.to_string().as_bytes(), false);
+    let sentence = format!("the device speaks VDA 5050 {VERSION} (see #");
+    run.end().code(2).says(&sentence).says("was to be judged by 2.1.0");
+    assert_eq!(bench.result()["verdict"], Value::Null);
+
+    let line = |second: u32| {
+        let topic = "vda5050/v3/RobotCompany/KIT-0001/state";
+        json!({ "tst": format!("2026-03-02T08:15:{second:02}.000Z"), "topic": topic, "payload": good("state-idle") })
+    };
+    let lines: Vec<String> = (31..35).map(|second| line(second).to_string()).collect();
+    fs::write(bench.path().join("site.jsonl"), lines.join("\n")).unwrap();
+    let ended = run_in(bench.path(), &["audit", "site.jsonl", "--protocol", "2.1.0"]).code(3);
+    let sentence = format!("it speaks version {VERSION} and was to be judged by 2.1.0");
+    assert!(ended.stdout.contains(&sentence), "{}", ended.stdout);
+    assert!(!ended.stdout.contains("FAIL"), "{}", ended.stdout);
 }

@@ -22,6 +22,7 @@ mod header;
 mod hint;
 pub mod join;
 mod message_check;
+pub mod migrate;
 mod misnamed;
 pub mod mistakes;
 mod mqtt_sessions;

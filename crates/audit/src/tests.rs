@@ -353,3 +353,122 @@ fn a_vehicle_with_other_software_is_judged_by_each_of_its_versions() {
     assert_eq!(versions, protocols);
     assert_eq!(found(&result, Role::Agv), BTreeSet::new());
 }
+
+/// States and a zone set of the newest version, of which there is no reference device; the first state comes at this time.
+fn newest(from: jiff::Timestamp) -> Vec<Message> {
+    let packs = &tck_testing::library().rules.packs;
+    let pack = packs.all().last().expect("a pack");
+    let good = |name: &str| -> serde_json::Value {
+        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+        let text = std::fs::read_to_string(format!("{root}/fixtures/messages/{}/good/{name}.json", pack.id));
+        serde_json::from_str(&text.expect("fixture")).expect("JSON")
+    };
+    let message = |second: i64, name: &str, mut payload: serde_json::Value| {
+        let at = jiff::Timestamp::from_second(from.as_second() + second).expect("a time");
+        payload["headerId"] = second.into();
+        payload["timestamp"] = format!("{at:.3}").into();
+        Message {
+            at: Some(at),
+            topic: format!("vda5050/v{}/RobotCompany/KIT-0001/{name}", pack.version.major),
+            payload: payload.to_string().into(),
+            qos: Some(0),
+            retain: None,
+            place: SourcePosition::default(),
+            after_gap: false,
+            carried: None,
+        }
+    };
+    let mut all = vec![message(2, "zoneSet", good("zoneSet-full"))];
+    all.extend((1..6).map(|second| message(second, "state", good("state-driving"))));
+    all
+}
+
+/// Traffic of another vehicle that speaks as the one of before.
+fn renamed(mut messages: Vec<Message>, serial: &str) -> Vec<Message> {
+    for message in &mut messages {
+        let mut levels: Vec<&str> = message.topic.split('/').collect();
+        let at = levels.len() - 2;
+        levels[at] = serial;
+        message.topic = levels.join("/");
+        if let Ok(mut payload) = serde_json::from_slice::<serde_json::Value>(&message.payload) {
+            payload["serialNumber"] = serial.into();
+            message.payload = payload.to_string().into();
+        }
+    }
+    messages
+}
+
+#[test]
+fn on_a_site_of_many_versions_each_vehicle_is_judged_by_its_own() {
+    let library = tck_testing::library();
+    let mut site = Vec::new();
+    let mut versions = BTreeSet::new();
+    for pack in library.rules.packs.of_devices() {
+        let one = traffic(library, pack, Role::Agv, "order-acceptance/base-and-horizon", &[]);
+        site.extend(renamed(one, &format!("robot-{}", pack.version.minor)));
+        versions.insert(pack.version.to_string());
+    }
+    let begun = site.iter().find_map(|message| message.at).expect("a time");
+    site.extend(newest(begun));
+    versions.insert(library.rules.packs.all().last().expect("a pack").version.to_string());
+    site.sort_by_key(|message| message.at);
+    let result = audited(library, site);
+    let judged: BTreeSet<String> = result
+        .vehicles
+        .iter()
+        .filter_map(|vehicle| vehicle.protocol.clone())
+        .collect();
+    assert_eq!((result.vehicles.len(), judged), (versions.len(), versions));
+    assert_eq!(found(&result, Role::Agv), BTreeSet::new());
+    assert_eq!(found(&result, Role::MasterControl), BTreeSet::new());
+    // What only the newest version has is no stored message of an unknown kind.
+    assert!(result.vehicles.iter().all(|vehicle| vehicle.not_judged.is_none()));
+    let newest = result
+        .vehicles
+        .iter()
+        .find(|vehicle| vehicle.messages.contains_key("zoneSet"));
+    assert_eq!(newest.map(|vehicle| vehicle.retained), Some(0));
+}
+
+#[test]
+fn who_speaks_another_major_version_than_was_asked_for_is_told_so_in_one_sentence() {
+    let library = tck_testing::library();
+    let packs = &library.rules.packs;
+    let (latest, last) = (packs.latest(), packs.all().last().expect("a pack"));
+    let judged_by = |protocol: &Pack, messages: Vec<Message>| {
+        let options = Options {
+            protocol: Some(protocol.id.clone()),
+            ..Options::default()
+        };
+        let mut audit = Audit::new(&library.rules, options).expect("options");
+        for message in messages {
+            audit.observe(message);
+        }
+        audit.finish(Vec::new())
+    };
+    let result = judged_by(latest, newest(jiff::Timestamp::UNIX_EPOCH));
+    assert_eq!((result.verdict, result.vehicles.len()), (None, 1));
+    let why = result.vehicles[0].not_judged.as_deref().expect("a sentence");
+    assert!(
+        why.contains(&format!("speaks version {}", last.version)) && why.contains("migrate"),
+        "{why}"
+    );
+    assert!(result.vehicles[0].sides.is_empty(), "{:#?}", result.vehicles[0].sides);
+    assert!(page::page(&result).contains(why));
+    let tests = "order-acceptance/base-and-horizon";
+    let own = traffic(library, latest, Role::Agv, tests, &[]);
+    let result = judged_by(last, own.clone());
+    assert!(result.vehicles[0].not_judged.is_some() && result.verdict.is_none());
+    // Topics of the version that was asked for, and another one in the headers: the headers are wrong.
+    let spoken = format!("\"{}\"", latest.version);
+    let wrong = own.into_iter().map(|message| Message {
+        payload: String::from_utf8_lossy(&message.payload)
+            .replace(&spoken, &format!("\"{}\"", last.version))
+            .into(),
+        ..message
+    });
+    let result = judged_by(latest, wrong.collect());
+    assert_eq!(result.vehicles[0].not_judged, None);
+    let found = found(&result, Role::Agv);
+    assert!(found.iter().any(|finding| finding.starts_with("HDR-04")), "{found:?}");
+}

@@ -148,6 +148,16 @@ impl Topics {
         })
     }
 
+    /// A topic with the major version of another one, where it says one.
+    pub fn with_major(&self, topic: &str, major: u64) -> String {
+        let found = self.form.captures(topic);
+        let level = found.and_then(|found| Some(found.name("majorVersion")?.range()));
+        level.map_or_else(
+            || topic.to_owned(),
+            |level| format!("{}{major}{}", &topic[..level.start], &topic[level.end..]),
+        )
+    }
+
     /// Reads a topic unless it is known; `None` when it is none of the protocol.
     pub fn know(&mut self, topic: &str) -> Option<Arc<Named>> {
         if let Some(known) = self.known.get(topic) {
@@ -209,6 +219,16 @@ mod tests {
         ] {
             assert_eq!(usual.read(other), None, "{other}");
         }
+    }
+
+    #[test]
+    fn a_topic_can_have_another_major_version() {
+        assert_eq!(
+            topics(None).with_major("uagv/v2/acme/7/state", 3),
+            "uagv/v3/acme/7/state"
+        );
+        let own = topics(Some("site/{serialNumber}/{topic}"));
+        assert_eq!(own.with_major("site/7/state", 3), "site/7/state");
     }
 
     #[test]

@@ -124,8 +124,8 @@ impl Vehicle {
         let is_first = self.begun.insert(name.to_owned());
         // Where the recording does not say it, the first message of a topic may be one that was stored, unless it was written when
         // it came.
-        let topic = scene.rules.packs.latest().topic(name);
-        let is_stored = || topic.is_none_or(|rule| rule.retain) || !is_fresh(&message);
+        let mut rules = scene.rules.packs.all().iter().filter_map(|pack| pack.topic(name));
+        let mut is_stored = || rules.any(|rule| rule.retain) || !is_fresh(&message);
         let stale = message.retain.unwrap_or_else(|| is_first && is_stored());
         let payload = Payload::keep(message.payload);
         let mut arrived = Arrived {
@@ -316,6 +316,13 @@ impl Vehicle {
         let packs = &scene.rules.packs;
         let worth = |text: &&String| !matches!(packs.said(text), VersionClaim::NoVersion);
         let told = scene.options.protocol.as_ref().and_then(|version| packs.get(version));
+        if let (Some(told), Some(spoken)) = (told, versions.iter().find(&worth))
+            && self.is_of_another_major(told, packs.get(spoken).map(AsRef::as_ref))
+        {
+            self.foreign = Some(spoken.clone());
+            self.waiting.clear();
+            return;
+        }
         let pack = match (told, versions.iter().find(worth), versions.first()) {
             (Some(pack), ..) => pack,
             (None, Some(version), _) => {
@@ -339,6 +346,13 @@ impl Vehicle {
         for arrived in std::mem::take(&mut self.waiting) {
             self.show(&arrived, scene);
         }
+    }
+
+    /// Whether the vehicle speaks a version whose messages have other members than those of the version that was asked for: it
+    /// would be one mistake, found in every message. Where its topics are of the version that was asked for, its header is wrong.
+    fn is_of_another_major(&self, told: &Pack, spoken: Option<&Pack>) -> bool {
+        let major = told.version.major;
+        spoken.is_some_and(|spoken| spoken.version.major != major) && self.named.major != Some(major)
     }
 
     fn show(&mut self, arrived: &Arrived, scene: AuditContext<'_>) {
@@ -435,13 +449,19 @@ impl Vehicle {
         self.news = self.news();
         let foreign = self.foreign.take();
         let Concluded { protocol, sides, holes } = self.conversation.conclude(scene);
-        let not_judged = protocol.is_none().then(|| match &foreign {
-            Some(version) => {
+        let told = scene.options.protocol.as_ref();
+        let spoken = foreign.as_ref().and_then(|version| scene.rules.packs.get(version));
+        let not_judged = protocol.is_none().then(|| match (&foreign, spoken.zip(told)) {
+            (Some(_), Some((spoken, told))) => format!(
+                "it speaks version {} and was to be judged by {told}, whose messages have other members; `migrate` says which",
+                spoken.version
+            ),
+            (Some(version), None) => {
                 let known = scene.rules.packs.all().iter().map(|pack| pack.version.to_string());
                 let known: Vec<String> = known.collect();
                 format!("version {version} is not known to this program ({})", known.join(", "))
             }
-            None => "no message names a protocol version".to_owned(),
+            (None, _) => "no message names a protocol version".to_owned(),
         });
         VehicleResult {
             manufacturer: self.manufacturer.clone(),

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use super::identity::somebody_else;
+use super::identity::{other_version, somebody_else};
 use super::presence::{Presence, is_stale};
 use super::session::Session;
 use super::sheet::Sheet;
@@ -64,6 +64,9 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             );
             return Ok(Err(why));
         }
+        if let Some(why) = self.somebody_else() {
+            return Ok(Err(why));
+        }
         self.factsheet().await?;
         if let Some(why) = self.is_another() {
             return Ok(Err(why));
@@ -92,12 +95,14 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         ))
     }
 
-    /// Who speaks instead of the device of the profile. A built-in device in virtual time is wrong on purpose.
+    /// Who speaks instead of the device of the profile, or which other version it speaks. A built-in device in virtual time is
+    /// wrong on purpose.
     pub(super) fn somebody_else(&self) -> Option<String> {
-        let is_virtual = self.engine.operator.runs_on_the_link();
-        (!is_virtual)
-            .then(|| somebody_else(self.engine.recorder.judge()))
-            .flatten()
+        let judge = self.engine.recorder.judge();
+        if self.engine.operator.runs_on_the_link() {
+            return None;
+        }
+        somebody_else(judge).or_else(|| other_version(judge))
     }
 
     /// Waits so long, and says from time to time what for.

@@ -5,6 +5,7 @@ use tck_base::clock::Moment;
 use tck_base::verdict::Verdict;
 use tck_capture::SourcePosition;
 use tck_judge::Library;
+use tck_view::{BatteryState, SafetyState, StateView};
 
 fn message(library: &Library, name: &str, number: u64, more: Value) -> (Stamp, Message) {
     let mut payload = json!({ "headerId": number, "version": library.rules.packs.latest().version.to_string(), "manufacturer": "acme", "serialNumber": "7",
@@ -246,4 +247,60 @@ fn messages_are_kept_for_a_while() {
     assert!(recent.bytes <= RECENT);
     assert!(recent.get(20).is_some() && recent.get(14).is_some());
     assert_eq!(recent.get(12), None);
+}
+
+#[test]
+fn vehicles_of_many_versions_are_watched_side_by_side_each_by_the_version_it_names() {
+    let library = tck_testing::library();
+    let options = Options {
+        only: vec!["message/*".to_owned()],
+        ..Options::default()
+    };
+    let mut watch = Watch::new(&library.rules, options).expect("options");
+    let mut notices = Vec::new();
+    for pack in library.rules.packs.all() {
+        let names = pack.names();
+        let name = |field| names.name(field).expect("a name").to_owned();
+        let power = json!({ name(BatteryState::battery_charge): 40.0, name(BatteryState::charging): false });
+        let safety = json!({ name(SafetyState::emergency_stop): "MANUAL", name(SafetyState::field_violation): false });
+        let state = json!({ "version": pack.version.to_string(), "operatingMode": "AUTOMATIC", "driving": false,
+            name(StateView::battery_state): power, name(StateView::safety_state): safety });
+        let (at, mut one) = message(library, "state", 1, state);
+        one.topic = format!("uagv/v{}/acme/{}/state", pack.version.major, pack.id);
+        notices.extend(watch.take(at, one));
+    }
+    let versions: Vec<String> = library
+        .rules
+        .packs
+        .all()
+        .iter()
+        .map(|pack| pack.version.to_string())
+        .collect();
+    let seen: Vec<String> = watch.glances().filter_map(|glance| glance.version.clone()).collect();
+    assert_eq!(seen, versions);
+    // Read by its own names from its first message on.
+    assert!(watch.glances().all(|glance| glance.charge == Some(40.0)));
+    let words: Vec<&str> = watch.alarms().iter().map(|one| one.alarm.word()).collect();
+    assert_eq!(words, vec!["emergency-stop"; versions.len()]);
+    for pack in library.rules.packs.all() {
+        let of_vehicle = notices.iter().filter(|notice| notice.found.serial_number == pack.id);
+        let said: Vec<&str> = of_vehicle.map(|notice| notice.found.text.as_str()).collect();
+        let lacks = pack.names().lacks(StateView::instant_action_states);
+        assert!(
+            said.iter().any(|text| text.contains("nodeStates")),
+            "{}: {said:?}",
+            pack.id
+        );
+        assert_eq!(
+            said.iter().any(|text| text.contains("instantActionStates")),
+            !lacks,
+            "{}: {said:?}",
+            pack.id
+        );
+        assert!(
+            !said.iter().any(|text| text.contains("operatingMode")),
+            "{}: {said:?}",
+            pack.id
+        );
+    }
 }

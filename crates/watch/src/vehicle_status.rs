@@ -179,17 +179,26 @@ impl VehicleStatus {
     }
 
     /// Takes in a message of its topic of this name; `stored` ones tell of the past. Gives what somebody has to be told. The
-    /// message is read as that of the version the vehicle has named.
+    /// message is read as that of the version that the vehicle names.
     pub fn take(&mut self, name: &str, at: Stamp, stored: bool, payload: &Bytes, packs: &Packs) -> Vec<Alarm> {
         *self.messages.entry(name.to_owned()).or_default() += 1;
         self.heard = Some(at);
         let mut alarms = Vec::new();
-        let pack = self.version.as_deref().and_then(|version| packs.get(version));
-        let names = pack.unwrap_or_else(|| packs.latest()).names();
         let topic = Topic::of_name(name);
-        let Ok(message) = MessageView::of_slice(topic, payload, names) else {
+        let read = |version: Option<&str>| {
+            let pack = version.and_then(|version| packs.get(version));
+            let names = pack.unwrap_or_else(|| packs.latest()).names();
+            MessageView::of_slice(topic, payload, names).ok()
+        };
+        let Some(mut message) = read(self.version.as_deref()) else {
             return alarms;
         };
+        let named = short(&message.header().version).filter(|_| !topic.is_to_vehicle());
+        if named.is_some() && named != self.version {
+            self.version = named;
+            // Its members may have other names than those that it was read by.
+            message = read(self.version.as_deref()).unwrap_or(message);
+        }
         match &message {
             MessageView::Order(order) if !stored => {
                 if let (Some(id), Some(update)) = (order.order_id.text(), order.order_update_id.whole()) {
@@ -214,9 +223,6 @@ impl VehicleStatus {
                 }
             }
             _ => {}
-        }
-        if !topic.is_to_vehicle() {
-            self.version = short(&message.header().version).or(self.version.take());
         }
         alarms
     }

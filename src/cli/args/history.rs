@@ -54,7 +54,7 @@ pub struct HistoryTo {
 }
 
 /// `KIND`, or `KIND=FILE`.
-fn rendered_to(text: &str) -> Result<HistoryTo, String> {
+pub(super) fn rendered_to(text: &str) -> Result<HistoryTo, String> {
     let (kind, file) = match text.split_once('=') {
         Some((_, "")) => return Err(format!("after `{text}` the name of a file is missing")),
         Some((kind, file)) => (kind, Some(PathBuf::from(file))),

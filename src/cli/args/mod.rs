@@ -9,6 +9,7 @@ mod discover;
 mod explore;
 mod history;
 mod inspect;
+mod migrate;
 mod rendering;
 mod run;
 mod selection;
@@ -32,6 +33,7 @@ pub use discover::{BrokerArgs, Discover, Init, ListenArgs};
 pub use explore::Explore;
 pub use history::{History, HistoryKind, HistoryTo};
 pub use inspect::{Explain, List, Listing, Report, Validate};
+pub use migrate::Migrate;
 pub(super) use rendering::to_file;
 pub use rendering::{RenderedTo, Rendering};
 pub use run::{CertificateArgs, Certify, Qualify, Run};
@@ -68,7 +70,9 @@ pub struct Cli {
         global = true,
         value_name = "FILE",
         env = "VDA5050_TCK_LOG_FILE",
-        hide_env_values = true
+        hide_env_values = true,
+        // Where it stands among the options of a command, however many commands there are.
+        display_order = 17
     )]
     pub log_file: Option<PathBuf>,
 }
@@ -90,6 +94,8 @@ pub enum Command {
     Audit(Audit),
     /// Judge live traffic by the monitors, as a subscriber on a broker; nothing is sent
     Watch(Watch),
+    /// Show what a device has to change to speak a later version, from its messages
+    Migrate(Migrate),
     /// Hold long random conversations with a device, and shrink those that fail to the shortest
     Explore(Explore),
     /// Check files: messages, suites, profiles, layouts or results, told apart by their content
@@ -140,6 +146,7 @@ impl Command {
             Self::Qualify(arguments) => arguments.format,
             Self::Discover(arguments) => arguments.format,
             Self::Audit(arguments) => arguments.format,
+            Self::Migrate(arguments) => arguments.format,
             Self::Watch(arguments) => arguments.format,
             Self::Explore(arguments) => arguments.output.format,
             Self::Explain(arguments) => arguments.format,
