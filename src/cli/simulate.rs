@@ -31,10 +31,12 @@ pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
     let packs = Packs::load(&crate::assets::embedded()).map_err(|error| Problem::Environment(error.to_string()))?;
     let pack = super::pack_for_devices(&packs, connection.protocol.as_deref().or(spoken))?;
     let endpoint = super::discover::endpoint(&connection.access)?;
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
-        .enable_all()
-        .build();
+    let mut builder = match &arguments.what {
+        Simulated::MasterControl(_) => tokio::runtime::Builder::new_multi_thread(),
+        // Vehicles do little each, and ten thousand of them fit on one core: a second one would only be told of the first.
+        _ => tokio::runtime::Builder::new_current_thread(),
+    };
+    let runtime = builder.worker_threads(2).enable_all().build();
     let runtime = runtime.map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
     runtime.block_on(async {
         match &arguments.what {
@@ -169,6 +171,8 @@ async fn agvs(
             agv.command(persona.word, persona.parameters.clone()).await;
         }
         running.push(agv);
+        // Those that run already get on meanwhile.
+        tokio::task::yield_now().await;
     }
     let server = match (&device.hooks, running.len()) {
         (Some(listen), 1) => {

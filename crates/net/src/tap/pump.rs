@@ -440,7 +440,7 @@ async fn sleep_until(due: Option<Instant>) {
 mod tests {
     use std::sync::Mutex;
 
-    use tokio::io::duplex;
+    use tokio::io::{DuplexStream, duplex};
 
     use super::*;
     use crate::bench::endpoint::Endpoint;
@@ -538,6 +538,15 @@ mod tests {
         }
     }
 
+    /// The device sends this, and the broker gets that.
+    async fn sends(ends: (&mut DuplexStream, &mut DuplexStream), packets: &[Vec<u8>], expected: &[u8]) {
+        let (device, broker) = ends;
+        device.write_all(&packets.concat()).await.unwrap();
+        let mut got = vec![0; expected.len()];
+        broker.read_exact(&mut got).await.unwrap();
+        assert_eq!(got, expected);
+    }
+
     #[tokio::test]
     async fn a_fault_takes_hold_of_the_next_packet_although_the_ones_before_ran_ahead() {
         let (shared, mut inbox) = shared();
@@ -547,21 +556,20 @@ mod tests {
         // Less than a packet: what is not taken at once goes on later.
         let (to, mut broker) = duplex(16);
         let talk = async {
-            let mut goes_through = async |packets: &[Vec<u8>], expected: &[u8]| {
-                device.write_all(&packets.concat()).await.unwrap();
-                let mut got = vec![0; expected.len()];
-                broker.read_exact(&mut got).await.unwrap();
-                assert_eq!(got, expected);
-            };
-            goes_through(&[CONNECT.to_vec()], CONNECT).await;
-            goes_through(&[publish(1, 10)], &publish(1, 10)).await;
+            sends((&mut device, &mut broker), &[CONNECT.to_vec()], CONNECT).await;
+            sends((&mut device, &mut broker), &[publish(1, 10)], &publish(1, 10)).await;
             shared.faults.lock().unwrap().apply(&LinkFault::Drop {
                 topic: None,
                 count: 1,
                 direction: None,
             });
-            goes_through(&[publish(2, 20), publish(3, 30)], &publish(3, 30)).await;
-            goes_through(&[publish(4, 40)], &publish(4, 40)).await;
+            sends(
+                (&mut device, &mut broker),
+                &[publish(2, 20), publish(3, 30)],
+                &publish(3, 30),
+            )
+            .await;
+            sends((&mut device, &mut broker), &[publish(4, 40)], &publish(4, 40)).await;
             device.shutdown().await.unwrap();
         };
         tokio::join!(talk, pump.run(from, to, shared.control.subscribe()));
