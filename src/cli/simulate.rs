@@ -145,13 +145,15 @@ async fn agvs(
     let clock = WallClock::start();
     let mut running = Vec::new();
     let is_fleet = device.count > 1 || device.offset > 0;
+    // They share what they know of their site.
+    let plain = ReferenceAgv::of(device.vehicle.0, pack);
     for number in device.offset + 1..=device.offset + device.count {
         let serial = if is_fleet {
             format!("{}-{number}", device.serial)
         } else {
             device.serial.clone()
         };
-        let mut reference = ReferenceAgv::of(device.vehicle.0, pack);
+        let mut reference = plain.clone();
         let template = template(&device.connection, like);
         reference.rename(&device.manufacturer, &serial, template, pack);
         if let Some(seconds) = device.state_interval {
