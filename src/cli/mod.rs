@@ -28,6 +28,7 @@ mod log;
 mod merge;
 mod message_stream;
 mod messages;
+mod open_files;
 mod outputs;
 mod page;
 mod pipeline;

@@ -141,6 +141,7 @@ async fn agvs(
 ) -> Result<Exit, Problem> {
     check_faults(Role::Agv, &device.fault)?;
     let (faults, tolerances) = habits(&device.fault, &device.tolerance, like);
+    super::open_files::allow(device.count);
     let mut signals = Signals::listen()?;
     let clock = WallClock::start();
     let mut running = Vec::new();
