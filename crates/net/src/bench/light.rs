@@ -39,9 +39,12 @@ pub struct LightClient {
     phase: Phase,
 }
 
+/// A connection that is being made, or why there is none.
+type Opening = Pin<Box<dyn Future<Output = Result<Box<Session>, String>> + Send>>;
+
 enum Phase {
-    /// On its way; what comes out is the connection, or why there is none.
-    Opening(Pin<Box<dyn Future<Output = Result<Box<Session>, String>> + Send>>),
+    /// On its way.
+    Opening(Opening),
     Open(Box<Session>),
     Gone,
 }
@@ -117,9 +120,10 @@ impl LightClient {
             std::future::poll_fn(|context| session.poll_flush(context)).await.ok()?;
             let shut = std::future::poll_fn(|context| Pin::new(&mut session.stream).poll_shutdown(context)).await;
             // TLS and a WebSocket have an end of their own, which the broker answers.
-            while shut.is_ok() && !is_plain(&session.endpoint) {
-                std::future::poll_fn(|context| session.poll_read(context)).await.ok()?;
-                session.read.clear();
+            if shut.is_ok() && !is_plain(&session.endpoint) {
+                while std::future::poll_fn(|context| session.poll_read(context)).await.is_ok() {
+                    session.read.clear();
+                }
             }
             Some(())
         };
