@@ -45,7 +45,7 @@ mod tests {
         allow(1);
         let first = getrlimit(Resource::Nofile);
         assert!(first.current.unwrap_or(u64::MAX) >= before.current.unwrap_or(u64::MAX));
-        let needed = 3_256.min(before.maximum.unwrap_or(u64::MAX));
+        let needed = 3_256_u64.min(before.maximum.unwrap_or(u64::MAX));
         allow(1_000);
         assert!(getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX) >= needed);
     }
