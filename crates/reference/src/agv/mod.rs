@@ -284,7 +284,9 @@ impl Device for Agv {
 
     fn handle(&mut self, now: Stamp, input: Input, out: &mut Vec<Output>) {
         self.advance(now);
-        self.rest.lasts &= matches!(input, Input::Time);
+        if !matches!(input, Input::Time) {
+            self.wake();
+        }
         match input {
             Input::Connected => self.connected(),
             Input::ConnectionLost => self.connection_lost(),

@@ -4,6 +4,7 @@
 //! the same, byte for byte. While somebody at a hook point may do anything otherwise there is no rest.
 
 use bytes::Bytes;
+use serde_json::Map;
 
 use crate::agv::Agv;
 use crate::{Output, Publication};
@@ -76,6 +77,23 @@ impl Agv {
         let body = self.state_picture();
         self.send_state(body, true);
         self.rest.state = self.repeatable("state", before);
+        if self.rest.state.is_some()
+            && let Some((_, last)) = &mut self.report.last
+        {
+            // It is the larger part of a vehicle, and can be worded again as long as nothing changes.
+            *last = Map::new();
+        }
+    }
+
+    /// Ends the rest, since something comes in: what was said last is known again.
+    pub(crate) fn wake(&mut self) {
+        if self.rest.state.is_some() {
+            let said = self.state_picture();
+            if let Some((_, last)) = &mut self.report.last {
+                *last = said;
+            }
+        }
+        self.rest = Rest::default();
     }
 
     fn repeat_visualization(&mut self) {
