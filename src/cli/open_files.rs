@@ -33,7 +33,8 @@ fn raise(needed: u64) {
 #[cfg(not(unix))]
 fn raise(_needed: u64) {}
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
+#[cfg(unix)]
 mod tests {
     use rustix::process::{Resource, getrlimit};
 

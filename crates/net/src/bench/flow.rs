@@ -89,14 +89,14 @@ impl Flow {
 
     /// A packet id that no message on its way has.
     pub(super) fn next_id(&mut self) -> u16 {
-        loop {
+        // Fewer than that are on their way, so that one is free.
+        for _ in 0..IN_FLIGHT {
             self.last_id = if self.last_id >= IN_FLIGHT { 1 } else { self.last_id + 1 };
-            let is_taken = self.on_their_way.iter().any(|(id, _)| *id == self.last_id);
-            // Only so many are on their way that one is free; all of them are while something is subscribed to, too.
-            if !is_taken || self.on_their_way.len() >= usize::from(IN_FLIGHT) {
-                return self.last_id;
+            if !self.on_their_way.iter().any(|(id, _)| *id == self.last_id) {
+                break;
             }
         }
+        self.last_id
     }
 
     /// Writes PINGREQ. An error when the last one was not answered.
