@@ -27,8 +27,12 @@ pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
         Simulated::MasterControl(device) => (&device.connection, named(device.like.as_deref(), Role::MasterControl)?),
         Simulated::Site(recording) => return site(recording),
     };
+    if matches!(arguments.what, Simulated::Agv(_)) {
+        use_small_pages();
+    }
     let spoken = like.as_ref().and_then(|like| like.protocol.as_deref());
-    let packs = Packs::load(&crate::assets::embedded()).map_err(|error| Problem::Environment(error.to_string()))?;
+    let packs =
+        Packs::load(&crate::assets::embedded_versions()).map_err(|error| Problem::Environment(error.to_string()))?;
     let pack = super::pack_for_devices(&packs, connection.protocol.as_deref().or(spoken))?;
     let endpoint = super::discover::endpoint(&connection.access)?;
     let mut builder = match &arguments.what {
@@ -40,13 +44,24 @@ pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
     let runtime = runtime.map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
     runtime.block_on(async {
         match &arguments.what {
-            Simulated::Agv(device) => agvs(device, like.as_ref(), &pack, &endpoint, arguments.format).await,
+            Simulated::Agv(device) => {
+                // The vehicles take the room of the versions they do not speak.
+                drop(packs);
+                agvs(device, like.as_ref(), &pack, &endpoint, arguments.format).await
+            }
             Simulated::MasterControl(device) => {
                 master_control(device, like.as_ref(), (&packs, &pack), &endpoint, arguments.format).await
             }
             Simulated::Site(recording) => site(recording),
         }
     })
+}
+
+/// Takes memory in small pages: of a huge one all is taken when a little is used, and vehicles use a little each.
+fn use_small_pages() {
+    // It is as good without, but larger.
+    #[cfg(target_os = "linux")]
+    let _ = rustix::thread::disable_transparent_huge_pages(true);
 }
 
 /// Writes the recording of a fleet.
