@@ -54,7 +54,7 @@ impl RunningDevice {
     ) -> Self {
         let (commands, receiver) = mpsc::unbounded_channel();
         let (told, first) = oneshot::channel();
-        let running = tokio::spawn(run_device(device, endpoint, clock, receiver, (sent, told)));
+        let running = tokio::spawn(run_device(Box::new(device), endpoint, clock, receiver, (sent, told)));
         Self {
             commands,
             first: Some(first),
@@ -110,7 +110,7 @@ impl RunningDevice {
 /// Runs `device` until the senders of `commands` are gone, and then disconnects it in order. What a device of
 /// the harness itself publishes is reported to `sent`, and how its first connection went to `told`.
 async fn run_device<D: Device>(
-    device: D,
+    device: Box<D>,
     endpoint: Endpoint,
     clock: WallClock,
     commands: mpsc::UnboundedReceiver<Box<Command>>,
@@ -133,7 +133,8 @@ async fn run_device<D: Device>(
 }
 
 struct Driver<D> {
-    device: D,
+    /// In a box, since a task has room for its arguments more than once.
+    device: Box<D>,
     endpoint: Endpoint,
     clock: WallClock,
     sent: Option<Reporter>,
