@@ -1,5 +1,7 @@
-//! The budgets of this program, measured: `cargo bench`. Each line says what was measured, and what is allowed; the end is a
-//! failure when one is missed. Nothing else should run on the machine meanwhile.
+//! The budgets of this program, measured: `cargo bench`, or only some of them: `cargo bench --bench budgets -- tap vehicles`.
+//! Each line says what was measured, and what is allowed; the end is a failure when one is missed. Nothing else should run on
+//! the machine meanwhile. Tap and vehicles are measured beside mosquitto where it is installed, and the vehicles beside those of
+//! the npm package where it is.
 #![allow(
     clippy::expect_used,
     clippy::panic,
@@ -8,15 +10,17 @@
 )]
 
 use std::io::Write as _;
-use std::process::{Command, Stdio};
+use std::net::{TcpListener, TcpStream};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use vda5050_tck::bench::client::{Client, ClientEvent, ClientOptions};
 use vda5050_tck::bench::endpoint::{Access, Endpoint};
+use vda5050_tck::broker::EmbeddedBroker;
 use vda5050_tck::device::Publication;
 use vda5050_tck::explore::{Coverage, Exploration, Grammar};
 use vda5050_tck::judge::judge;
-use vda5050_tck::link::mqtt::{BenchOptions, MqttBench};
+use vda5050_tck::link::mqtt::{BenchOptions, BrokerChoice, MqttBench};
 use vda5050_tck::pack::Role;
 use vda5050_tck::run::{Selection, VirtualRun, run_silently};
 
@@ -62,9 +66,24 @@ fn main() {
     if !std::env::args().any(|argument| argument == "--bench") {
         return;
     }
-    let measures: [fn() -> Vec<Measured>; 6] = [start_up, virtual_suite, exploration, tap, vehicles, audit];
+    let measures: [(&str, fn() -> Vec<Measured>); 6] = [
+        ("start-up", start_up),
+        ("virtual-suite", virtual_suite),
+        ("exploration", exploration),
+        ("tap", tap),
+        ("vehicles", vehicles),
+        ("audit", audit),
+    ];
+    let wanted: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|argument| !argument.starts_with('-'))
+        .collect();
+    open_files();
     let mut missed = 0;
-    for measure in measures {
+    for (name, measure) in measures {
+        if !wanted.is_empty() && !wanted.iter().any(|wanted| wanted == name) {
+            continue;
+        }
         for one in measure() {
             let word = if one.at_least { "at least" } else { "at most" };
             let verdict = if one.holds() { "ok    " } else { "missed" };
@@ -211,37 +230,118 @@ async fn there_and_back(device: &str, harness: &str, times: usize) -> Vec<f64> {
     all
 }
 
-/// What the tap adds to the broker behind it.
+/// A mosquitto on a port of its own, which ends with it.
+struct Mosquitto {
+    process: Child,
+    url: String,
+    _folder: tempfile::TempDir,
+}
+
+impl Mosquitto {
+    /// Nothing where it is not installed.
+    fn start() -> Option<Self> {
+        let port = TcpListener::bind("127.0.0.1:0").ok()?.local_addr().ok()?.port();
+        let folder = tempfile::tempdir().ok()?;
+        let file = folder.path().join("mosquitto.conf");
+        let rules = format!("listener {port} 127.0.0.1\nallow_anonymous true\nset_tcp_nodelay true\nlog_type none\n");
+        std::fs::write(&file, rules).ok()?;
+        let mut command = Command::new("mosquitto");
+        // Debian has it where only the superuser looks.
+        command.env(
+            "PATH",
+            format!("{}:/usr/sbin", std::env::var("PATH").unwrap_or_default()),
+        );
+        command.arg("-c").arg(&file).stdout(Stdio::null()).stderr(Stdio::null());
+        let process = command.spawn().ok()?;
+        for _ in 0..100 {
+            if TcpStream::connect(("127.0.0.1", port)).is_ok() {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        Some(Self {
+            process,
+            url: format!("mqtt://127.0.0.1:{port}"),
+            _folder: folder,
+        })
+    }
+}
+
+impl Drop for Mosquitto {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// As many open files as the system allows, for this process and those it starts.
+#[cfg(unix)]
+fn open_files() {
+    use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+    let limit = getrlimit(Resource::Nofile);
+    let raised = Rlimit {
+        current: limit.maximum,
+        ..limit
+    };
+    let _ = setrlimit(Resource::Nofile, raised);
+}
+
+#[cfg(not(unix))]
+fn open_files() {}
+
+/// What the tap adds to the broker behind it, the embedded one and mosquitto.
 fn tap() -> Vec<Measured> {
+    let mut all = tap_before(
+        BrokerChoice::Embedded,
+        [
+            "tap, a 3-KB message there and back, median over the broker alone",
+            "tap, a 3-KB message there and back, p99 over the broker alone",
+        ],
+    );
+    match Mosquitto::start() {
+        Some(mosquitto) => {
+            let url = mosquitto.url.clone();
+            let access = Access::default();
+            all.extend(tap_before(
+                BrokerChoice::External { url, access },
+                [
+                    "tap, a 3-KB message there and back, median over mosquitto alone",
+                    "tap, a 3-KB message there and back, p99 over mosquitto alone",
+                ],
+            ));
+        }
+        None => println!("       no mosquitto on this machine: the tap is not measured beside it"),
+    }
+    all
+}
+
+fn tap_before(broker: BrokerChoice, [at_the_median, at_p99]: [&'static str; 2]) -> Vec<Measured> {
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()
         .build()
         .unwrap();
     let (mut direct, mut tapped) = runtime.block_on(async {
-        let (link, info) = MqttBench::start(BenchOptions::loopback(vec!["nobody".to_owned()]))
-            .await
-            .unwrap();
+        let options = BenchOptions {
+            broker,
+            ..BenchOptions::loopback(vec!["nobody".to_owned()])
+        };
+        let (link, info) = MqttBench::start(options).await.unwrap();
         let direct = there_and_back(&info.broker_address, &info.broker_address, 2_000).await;
         let tapped = there_and_back(&info.device_address, &info.broker_address, 2_000).await;
         link.stop().await;
         (direct, tapped)
     });
     runtime.shutdown_background();
-    let added = |direct: &mut [f64], tapped: &mut [f64], part| percentile(tapped, part) - percentile(direct, part);
+    let mut shown = |part| (percentile(&mut direct, part), percentile(&mut tapped, part));
+    let (median, p99) = (shown(0.5), shown(0.99));
+    println!(
+        "       without the tap {:.0} µs (p99 {:.0} µs), through it {:.0} µs (p99 {:.0} µs)",
+        median.0, p99.0, median.1, p99.1
+    );
     vec![
-        at_most(
-            "tap, a 3-KB message there and back, median over the broker alone",
-            added(&mut direct, &mut tapped, 0.5),
-            "µs",
-            40.0,
-        ),
-        at_most(
-            "tap, a 3-KB message there and back, p99 over the broker alone",
-            added(&mut direct, &mut tapped, 0.99),
-            "µs",
-            150.0,
-        ),
+        at_most(at_the_median, median.1 - median.0, "µs", 40.0),
+        at_most(at_p99, p99.1 - p99.0, "µs", 150.0),
     ]
 }
 
@@ -256,49 +356,110 @@ fn used_by(process: u32) -> Option<(f64, f64)> {
     Some((ticks / 100.0, memory / 1024.0))
 }
 
-/// A thousand mock AGVs with a state a second, at a broker of their own.
+/// What a process takes of one core, in percent, and memory in MB, once it has had so many seconds to begin.
+fn costs(mut process: Child, begins: u64) -> Option<(f64, f64)> {
+    const SECONDS: u64 = 20;
+    std::thread::sleep(Duration::from_secs(begins));
+    let before = used_by(process.id());
+    std::thread::sleep(Duration::from_secs(SECONDS));
+    let after = used_by(process.id());
+    process.kill().unwrap();
+    process.wait().unwrap();
+    let ((begun, _), (ended, memory)) = (before?, after?);
+    Some(((ended - begun) / SECONDS as f64 * 100.0, memory))
+}
+
+/// Mock AGVs with a state a second each.
+fn mock_agvs(count: u32, broker: &str) -> Child {
+    let count = count.to_string();
+    let arguments = [
+        "simulate",
+        "agv",
+        "--count",
+        &count,
+        "--state-interval",
+        "1",
+        "--broker",
+        broker,
+    ];
+    program().args(arguments).spawn().unwrap()
+}
+
+/// Controllers of the npm package with a state a second each; nothing where it is not installed.
+fn npm_agvs(count: u32, broker: &str) -> Option<Child> {
+    if !std::path::Path::new("fixtures/devices/vda-5050-lib-agv/node_modules").is_dir() {
+        return None;
+    }
+    let mut command = Command::new("node");
+    command.args(["benches/npm_fleet/fleet.mjs", broker, &count.to_string()]);
+    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    command.spawn().ok()
+}
+
+/// Mock AGVs with a state a second, at mosquitto where it is installed, and at the embedded broker in this process elsewhere.
 fn vehicles() -> Vec<Measured> {
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(1)
         .enable_all()
         .build()
         .unwrap();
-    let broker = runtime.block_on(vda5050_tck::broker::EmbeddedBroker::start()).unwrap();
-    let url = format!("mqtt://{}", broker.address());
-    let mut fleet = program()
-        .args([
-            "simulate",
-            "agv",
-            "--count",
-            "1000",
-            "--state-interval",
-            "1",
-            "--broker",
-            &url,
-        ])
-        .spawn()
-        .unwrap();
-    std::thread::sleep(Duration::from_secs(15));
-    let before = used_by(fleet.id());
-    std::thread::sleep(Duration::from_secs(20));
-    let after = used_by(fleet.id());
-    fleet.kill().unwrap();
-    fleet.wait().unwrap();
-    runtime.block_on(broker.stop());
-    runtime.shutdown_background();
-    let (Some((begun, _)), Some((ended, memory))) = (before, after) else {
-        println!("       no /proc on this machine: mock AGVs are not measured");
-        return Vec::new();
+    let mosquitto = Mosquitto::start();
+    let embedded = match &mosquitto {
+        Some(_) => None,
+        None => Some(runtime.block_on(EmbeddedBroker::start()).unwrap()),
     };
-    vec![
-        at_most(
-            "1,000 mock AGVs at 1 Hz, of one core",
-            (ended - begun) / 20.0 * 100.0,
-            "%",
-            3.0,
+    let url = match (&mosquitto, &embedded) {
+        (Some(mosquitto), _) => mosquitto.url.clone(),
+        (None, Some(embedded)) => format!("mqtt://{}", embedded.address()),
+        (None, None) => return Vec::new(),
+    };
+    let beside = |what: &str, measured: Option<(f64, f64)>| match measured {
+        Some((core, memory)) => println!("       {what}: {core:.1} % of one core, {memory:.0} MB"),
+        None => println!("       {what}: not measured, it is not here or this machine has no /proc"),
+    };
+    beside("200 of ours", costs(mock_agvs(200, &url), 10));
+    let theirs = npm_agvs(200, &url).and_then(|fleet| costs(fleet, 20));
+    beside("200 AgvControllers of the npm package", theirs);
+    let fleets: [(u32, u64, [&'static str; 2], [f64; 2]); 2] = [
+        (
+            1_000,
+            15,
+            [
+                "1,000 mock AGVs at 1 Hz, of one core",
+                "1,000 mock AGVs at 1 Hz, memory",
+            ],
+            [3.0, 48.0],
         ),
-        at_most("1,000 mock AGVs at 1 Hz, memory", memory, "MB", 48.0),
-    ]
+        (
+            10_000,
+            60,
+            [
+                "10,000 mock AGVs at 1 Hz, of one core",
+                "10,000 mock AGVs at 1 Hz, memory",
+            ],
+            [50.0, 400.0],
+        ),
+    ];
+    let mut all = Vec::new();
+    for (count, begins, [of_core, of_memory], [most, largest]) in fleets {
+        let Some((core, memory)) = costs(mock_agvs(count, &url), begins) else {
+            println!("       no /proc on this machine: mock AGVs are not measured");
+            break;
+        };
+        let each = f64::from(count);
+        println!(
+            "       {count}: {:.1} µs a vehicle and second, {:.1} KB a vehicle with its share of the program",
+            core * 1e4 / each,
+            memory * 1024.0 / each
+        );
+        all.push(at_most(of_core, core, "%", most));
+        all.push(at_most(of_memory, memory, "MB", largest));
+    }
+    if let Some(embedded) = embedded {
+        runtime.block_on(embedded.stop());
+    }
+    runtime.shutdown_background();
+    all
 }
 
 /// States of 3 KB in a recording.

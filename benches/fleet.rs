@@ -1,7 +1,7 @@
 //! A thousand simulated vehicles without a network: what a virtual second of them costs, and how much memory they take.
 //!
-//! `cargo bench --bench fleet`. Every vehicle is connected, publishes its states and its visualization, and drives slowly
-//! over two edges.
+//! `cargo bench --bench fleet`. Every vehicle is connected and publishes a state and a visualization a second; they stand at
+//! first, and then drive slowly over two edges.
 #![expect(
     clippy::unwrap_used,
     clippy::print_stdout,
@@ -21,13 +21,22 @@ const VEHICLES: usize = 1_000;
 const SECONDS: u64 = 60;
 
 fn main() {
+    for drives in [false, true] {
+        measure(drives);
+    }
+}
+
+/// A fleet that stands, or drives.
+fn measure(drives: bool) {
     let library = vda5050_tck::library(None).unwrap();
     let pack = library.rules.packs.latest();
     let before = resident();
+    let like = ReferenceAgv::new(pack);
     let mut fleet: Vec<Agv> = (0..VEHICLES)
         .map(|number| {
-            let mut like = ReferenceAgv::new(pack);
+            let mut like = like.clone();
             like.rename("bench", &format!("agv-{number}"), None, pack);
+            like.config.state_interval = Duration::from_secs(1);
             mock(like.config)
         })
         .collect();
@@ -35,12 +44,14 @@ fn main() {
     for (number, agv) in fleet.iter_mut().enumerate() {
         let now = at(Moment::START);
         agv.handle(now, Input::Connected, &mut sent.out);
-        let order = order(&pack.version.to_string(), number).to_string();
-        let message = Input::Message {
-            topic: format!("uagv/v2/bench/agv-{number}/order"),
-            payload: order.into_bytes().into(),
-        };
-        agv.handle(now, message, &mut sent.out);
+        if drives {
+            let order = order(&pack.version.to_string(), number).to_string();
+            let message = Input::Message {
+                topic: format!("uagv/v2/bench/agv-{number}/order"),
+                payload: order.into_bytes().into(),
+            };
+            agv.handle(now, message, &mut sent.out);
+        }
         sent.count();
     }
     let begun = Instant::now();
@@ -55,8 +66,9 @@ fn main() {
     }
     let took = begun.elapsed();
     assert!(sent.messages > VEHICLES as u64 * SECONDS, "{} messages", sent.messages);
+    let how = if drives { "drive" } else { "stand" };
     println!(
-        "{VEHICLES} vehicles, {SECONDS} virtual seconds, {} messages",
+        "{VEHICLES} vehicles that {how}, {SECONDS} virtual seconds, {} messages",
         sent.messages
     );
     println!("one of {SECONDS} seconds: {:.2} ms", share(took) * 1_000.0);

@@ -31,6 +31,14 @@ pub fn embedded() -> Assets {
     Assets::built_in(files)
 }
 
+/// The protocol versions the program was built with, for devices that need no suites.
+#[cfg(feature = "cli")]
+pub(crate) fn embedded_versions() -> Assets {
+    let mut files = Vec::new();
+    embedded_files("schemas", &SCHEMAS, &mut files);
+    Assets::built_in(files)
+}
+
 /// The counterparts the program was built with. Nothing is judged by them, so they are no part of the suites.
 ///
 /// # Errors
@@ -114,6 +122,20 @@ mod tests {
         // The program does not lint what it carries; as files of a folder they are.
         let linted = Library::load(own, crate::checks::REGISTRY);
         assert!(linted.is_ok_and(|library| !library.rules.suites.tests.is_empty()));
+    }
+
+    #[cfg(feature = "cli")]
+    #[test]
+    fn the_versions_alone_are_all_versions() {
+        let versions = |assets: &Assets| {
+            let packs = tck_pack::Packs::load(assets).expect("versions");
+            packs
+                .all()
+                .iter()
+                .map(|pack| pack.version.to_string())
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(versions(&embedded_versions()), versions(&embedded()));
     }
 
     #[test]

@@ -29,6 +29,7 @@ mod merge;
 mod message_stream;
 mod messages;
 mod migrate;
+mod open_files;
 mod outputs;
 mod page;
 mod pipeline;

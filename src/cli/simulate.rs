@@ -27,24 +27,41 @@ pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
         Simulated::MasterControl(device) => (&device.connection, named(device.like.as_deref(), Role::MasterControl)?),
         Simulated::Site(recording) => return site(recording),
     };
+    if matches!(arguments.what, Simulated::Agv(_)) {
+        use_small_pages();
+    }
     let spoken = like.as_ref().and_then(|like| like.protocol.as_deref());
-    let packs = Packs::load(&crate::assets::embedded()).map_err(|error| Problem::Environment(error.to_string()))?;
+    let packs =
+        Packs::load(&crate::assets::embedded_versions()).map_err(|error| Problem::Environment(error.to_string()))?;
     let pack = super::pack_for_devices(&packs, connection.protocol.as_deref().or(spoken))?;
     let endpoint = super::discover::endpoint(&connection.access)?;
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
-        .enable_all()
-        .build();
+    let mut builder = match &arguments.what {
+        Simulated::MasterControl(_) => tokio::runtime::Builder::new_multi_thread(),
+        // Vehicles do little each, and ten thousand of them fit on one core: a second one would only be told of the first.
+        _ => tokio::runtime::Builder::new_current_thread(),
+    };
+    let runtime = builder.worker_threads(2).enable_all().build();
     let runtime = runtime.map_err(|error| Problem::Environment(format!("cannot start: {error}")))?;
     runtime.block_on(async {
         match &arguments.what {
-            Simulated::Agv(device) => agvs(device, like.as_ref(), &pack, &endpoint, arguments.format).await,
+            Simulated::Agv(device) => {
+                // The vehicles take the room of the versions they do not speak.
+                drop(packs);
+                agvs(device, like.as_ref(), &pack, &endpoint, arguments.format).await
+            }
             Simulated::MasterControl(device) => {
                 master_control(device, like.as_ref(), (&packs, &pack), &endpoint, arguments.format).await
             }
             Simulated::Site(recording) => site(recording),
         }
     })
+}
+
+/// Takes memory in small pages: of a huge one all is taken when a little is used, and vehicles use a little each.
+fn use_small_pages() {
+    // It is as good without, but larger.
+    #[cfg(target_os = "linux")]
+    let _ = rustix::thread::disable_transparent_huge_pages(true);
 }
 
 /// Writes the recording of a fleet.
@@ -139,17 +156,20 @@ async fn agvs(
 ) -> Result<Exit, Problem> {
     check_faults(Role::Agv, &device.fault)?;
     let (faults, tolerances) = habits(&device.fault, &device.tolerance, like);
+    super::open_files::allow(device.count);
     let mut signals = Signals::listen()?;
     let clock = WallClock::start();
     let mut running = Vec::new();
     let is_fleet = device.count > 1 || device.offset > 0;
+    // They share what they know of their site.
+    let plain = ReferenceAgv::of(device.vehicle.0, pack);
     for number in device.offset + 1..=device.offset + device.count {
         let serial = if is_fleet {
             format!("{}-{number}", device.serial)
         } else {
             device.serial.clone()
         };
-        let mut reference = ReferenceAgv::of(device.vehicle.0, pack);
+        let mut reference = plain.clone();
         let template = template(&device.connection, like);
         reference.rename(&device.manufacturer, &serial, template, pack);
         if let Some(seconds) = device.state_interval {
@@ -169,6 +189,8 @@ async fn agvs(
             agv.command(persona.word, persona.parameters.clone()).await;
         }
         running.push(agv);
+        // Those that run already get on meanwhile.
+        tokio::task::yield_now().await;
     }
     let server = match (&device.hooks, running.len()) {
         (Some(listen), 1) => {

@@ -1,7 +1,8 @@
 //! Runs a reference device against a real broker or tap.
 //!
 //! The device decides everything; the driver owns the sockets and the clock. Messages of a device without a
-//! connection are dropped.
+//! connection are dropped. A device is one task and nothing else, since thousands of them live in a process: its connection is
+//! part of the task, and what it says at one moment is one write.
 
 use std::time::Duration;
 
@@ -16,8 +17,9 @@ use super::fetching::{Progress, fetch};
 use super::witness::{Witness, report};
 use tck_base::clock::{Moment, WallClock};
 use tck_base::device::{Commanded, Device, Input, Output, Publication};
-use tck_net::bench::client::{Client, ClientEvent, ClientOptions};
+use tck_net::bench::client::{ClientEvent, ClientOptions};
 use tck_net::bench::endpoint::Endpoint;
+use tck_net::bench::light::LightClient;
 use tck_net::link::mqtt::Reporter;
 
 /// A device that wants to be woken again and again at the same moment gets on in steps of this.
@@ -36,7 +38,7 @@ pub struct Command {
 
 /// A device that runs in a task of its own.
 pub struct RunningDevice {
-    commands: mpsc::UnboundedSender<Command>,
+    commands: mpsc::UnboundedSender<Box<Command>>,
     first: Option<oneshot::Receiver<Result<(), String>>>,
     running: JoinHandle<()>,
 }
@@ -52,7 +54,7 @@ impl RunningDevice {
     ) -> Self {
         let (commands, receiver) = mpsc::unbounded_channel();
         let (told, first) = oneshot::channel();
-        let running = tokio::spawn(run_device(device, endpoint, clock, receiver, (sent, told)));
+        let running = tokio::spawn(run_device(Box::new(device), endpoint, clock, receiver, (sent, told)));
         Self {
             commands,
             first: Some(first),
@@ -86,7 +88,7 @@ impl RunningDevice {
             parameter,
             done,
         };
-        match self.commands.send(command) {
+        match self.commands.send(Box::new(command)) {
             Ok(()) => heard.await.unwrap_or(Commanded::Nobody),
             Err(_) => Commanded::Nobody,
         }
@@ -108,10 +110,10 @@ impl RunningDevice {
 /// Runs `device` until the senders of `commands` are gone, and then disconnects it in order. What a device of
 /// the harness itself publishes is reported to `sent`, and how its first connection went to `told`.
 async fn run_device<D: Device>(
-    device: D,
+    device: Box<D>,
     endpoint: Endpoint,
     clock: WallClock,
-    commands: mpsc::UnboundedReceiver<Command>,
+    commands: mpsc::UnboundedReceiver<Box<Command>>,
     (sent, told): (Option<Reporter>, oneshot::Sender<Result<(), String>>),
 ) {
     let (downloads, progress) = mpsc::unbounded_channel();
@@ -131,24 +133,25 @@ async fn run_device<D: Device>(
 }
 
 struct Driver<D> {
-    device: D,
+    /// In a box, since a task has room for its arguments more than once.
+    device: Box<D>,
     endpoint: Endpoint,
     clock: WallClock,
     sent: Option<Reporter>,
     /// Told how the first connection went.
     told: Option<oneshot::Sender<Result<(), String>>>,
-    connection: Option<(Client, mpsc::Receiver<ClientEvent>)>,
+    connection: Option<LightClient>,
     client_id: String,
     will: Option<Publication>,
     established: bool,
-    downloads: mpsc::UnboundedSender<Progress>,
+    downloads: mpsc::UnboundedSender<Box<Progress>>,
 }
 
 impl<D: Device> Driver<D> {
     async fn run(
         mut self,
-        mut commands: mpsc::UnboundedReceiver<Command>,
-        mut progress: mpsc::UnboundedReceiver<Progress>,
+        mut commands: mpsc::UnboundedReceiver<Box<Command>>,
+        mut progress: mpsc::UnboundedReceiver<Box<Progress>>,
     ) {
         self.give(Input::Time).await;
         let mut earliest = Moment::START;
@@ -163,26 +166,29 @@ impl<D: Device> Driver<D> {
             let alarm = Instant::from_std(self.clock.instant(wake_up.unwrap_or_default()));
             tokio::select! {
                 event = next_event(&mut self.connection) => self.happened(event).await,
-                Some((token, progress)) = progress.recv() => self.give(Input::Download { token, progress }).await,
+                Some(made) = progress.recv() => {
+                    let (token, progress) = *made;
+                    self.give(Input::Download { token, progress }).await;
+                }
                 command = commands.recv() => match command {
                     Some(command) => {
-                        let commanded = match self.device.declines(&command.name, &command.parameter) {
+                        let Command { name, parameter, done } = *command;
+                        let commanded = match self.device.declines(&name, &parameter) {
                             Some(why) => Commanded::Declined(why),
                             None => {
-                                self.give(Input::Command(command.name, command.parameter)).await;
+                                self.give(Input::Command(name, parameter)).await;
                                 Commanded::Taken
                             }
                         };
                         // Whoever asked may have stopped waiting.
-                        let _ = command.done.send(commanded);
+                        let _ = done.send(commanded);
                     }
                     None => break,
                 },
                 () = sleep_until(alarm), if wake_up.is_some() => {}
             }
         }
-        if let Some((client, events)) = self.connection.take() {
-            drop(events);
+        if let Some(client) = self.connection.take() {
             client.disconnect().await;
         }
     }
@@ -230,16 +236,17 @@ impl<D: Device> Driver<D> {
                 Output::Connect => self.connect(),
                 Output::Disconnect => {
                     self.established = false;
-                    if let Some((client, events)) = self.connection.take() {
-                        drop(events);
+                    if let Some(client) = self.connection.take() {
                         client.disconnect().await;
                     }
                 }
                 Output::Drop => {
+                    // What was said before goes out before.
+                    self.flush().await;
                     self.established = false;
                     let witness = match (self.sent.clone(), self.will.clone()) {
                         (Some(reporter), Some(will)) if self.connection.is_some() => {
-                            Some(Witness::open(&self.endpoint, &self.client_id, will, reporter).await)
+                            Some(Box::pin(Witness::open(&self.endpoint, &self.client_id, will, reporter)).await)
                         }
                         _ => None,
                     };
@@ -249,6 +256,7 @@ impl<D: Device> Driver<D> {
                     }
                 }
                 Output::Raw(bytes) => {
+                    self.flush().await;
                     let (endpoint, id) = (self.endpoint.clone(), format!("{}-raw", self.client_id));
                     tokio::spawn(async move {
                         if let Err(error) = send_raw(&endpoint, &id, &bytes).await {
@@ -258,6 +266,14 @@ impl<D: Device> Driver<D> {
                 }
             }
         }
+        self.flush().await;
+    }
+
+    /// Sends what the device has said, in one go.
+    async fn flush(&mut self) {
+        if let Some(client) = &mut self.connection {
+            client.flush().await;
+        }
     }
 
     fn connect(&mut self) {
@@ -265,7 +281,7 @@ impl<D: Device> Driver<D> {
         self.client_id = self.endpoint.client_id.clone().unwrap_or(options.client_id);
         self.will = options.will;
         self.established = false;
-        self.connection = Some(Client::open(&ClientOptions {
+        self.connection = Some(LightClient::open(ClientOptions {
             endpoint: self.endpoint.clone(),
             client_id: self.client_id.clone(),
             keep_alive: options.keep_alive,
@@ -276,7 +292,7 @@ impl<D: Device> Driver<D> {
     }
 
     async fn publish(&mut self, message: Publication) {
-        let Some((client, _)) = self.connection.as_ref().filter(|_| self.established) else {
+        let Some(client) = self.connection.as_mut().filter(|_| self.established) else {
             return;
         };
         if let Some(reporter) = &self.sent {
@@ -286,18 +302,15 @@ impl<D: Device> Driver<D> {
     }
 }
 
-async fn next_event(connection: &mut Option<(Client, mpsc::Receiver<ClientEvent>)>) -> ClientEvent {
+async fn next_event(connection: &mut Option<LightClient>) -> ClientEvent {
     match connection {
-        Some((_, events)) => {
-            let event = events.recv().await;
-            event.unwrap_or_else(|| ClientEvent::Lost("the connection ended".to_owned()))
-        }
+        Some(client) => client.next().await,
         None => std::future::pending().await,
     }
 }
 
-/// Sends bytes that no client library would send. They cannot go over the device's own connection, which
-/// rumqttc owns, so they get one of their own, opened with a CONNECT of MQTT 3.1.1.
+/// Sends bytes that no client library would send. They cannot go over the device's own connection, whose
+/// client sends packets only, so they get one of their own, opened with a CONNECT of MQTT 3.1.1.
 async fn send_raw(endpoint: &Endpoint, client_id: &str, bytes: &[u8]) -> std::io::Result<()> {
     let mut socket = TcpStream::connect((endpoint.host.as_str(), endpoint.port)).await?;
     socket.set_nodelay(true)?;

@@ -19,14 +19,19 @@ const TRANSFER_LIMIT: Duration = Duration::from_secs(120);
 pub(super) type Progress = (u64, Download);
 
 /// Fetches a file in a thread of its own.
-pub(super) fn fetch(token: u64, url: String, authority: Option<PathBuf>, progress: mpsc::UnboundedSender<Progress>) {
+pub(super) fn fetch(
+    token: u64,
+    url: String,
+    authority: Option<PathBuf>,
+    progress: mpsc::UnboundedSender<Box<Progress>>,
+) {
     std::thread::spawn(move || {
-        let begun = || drop(progress.send((token, Download::Begun)));
+        let begun = || drop(progress.send(Box::new((token, Download::Begun))));
         let end = match download(&url, authority.as_ref(), begun) {
             Ok(body) => Download::Done(body),
             Err(error) => Download::Failed(error.to_string()),
         };
-        let _ = progress.send((token, end));
+        let _ = progress.send(Box::new((token, end)));
     });
 }
 

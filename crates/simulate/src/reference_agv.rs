@@ -349,7 +349,7 @@ impl ReferenceAgv {
 
     /// Puts it on another floor, where it knows no stations.
     pub fn live_on(&mut self, layout: Layout) {
-        self.config.nodes = layout_nodes(&layout);
+        self.config.nodes = layout_nodes(&layout).into();
         self.config.start_node = self
             .config
             .nodes

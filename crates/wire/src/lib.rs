@@ -82,6 +82,12 @@ impl Reader {
         self.level
     }
 
+    /// Whether all that was taken was given out as packets, so that what comes next begins one.
+    #[must_use]
+    pub fn is_between_packets(&self) -> bool {
+        self.buffer.is_empty() && self.lost.is_none()
+    }
+
     /// Takes what was received.
     pub fn push(&mut self, bytes: &[u8]) {
         self.buffer.extend_from_slice(bytes);
@@ -219,6 +225,25 @@ fn frame(bytes: &[u8]) -> Frame {
     } else {
         Frame::Partial
     }
+}
+
+/// How many packets these bytes are: nothing when they are not whole packets from the first byte to the last, or a CONNECT is
+/// among them. Looks at the lengths only.
+#[must_use]
+pub fn whole_packets(bytes: &[u8]) -> Option<u32> {
+    let mut rest = bytes;
+    let mut count = 0;
+    while let Some(first) = rest.first() {
+        if first >> 4 == CONNECT {
+            return None;
+        }
+        let Frame::Whole { head, body } = frame(rest) else {
+            return None;
+        };
+        rest = rest.get(head + body..)?;
+        count += 1;
+    }
+    Some(count).filter(|count| *count > 0)
 }
 
 /// Decodes one packet and insists that nothing is left over.
@@ -410,6 +435,22 @@ mod tests {
     }
 
     #[test]
+    fn packets_are_counted_when_they_are_whole_and_no_connect() {
+        let two = b"\xc0\x00\x30\x05\x00\x01tok";
+        assert_eq!(whole_packets(two), Some(2));
+        assert_eq!(whole_packets(b""), None);
+        for end in [1, 3, two.len() - 1] {
+            assert_eq!(whole_packets(&two[..end]), None, "{end}");
+        }
+        assert_eq!(
+            whole_packets(b"\xc0\x00\x10\x02ab"),
+            None,
+            "a CONNECT may have to be changed"
+        );
+        assert_eq!(whole_packets(b"\x30\xff\xff\xff\xff\x01"), None);
+    }
+
+    #[test]
     fn an_unknown_protocol_level_is_named() {
         let error = one(b"\x10\x0e\x00\x04MQTT\x06\x02\x00\x00\x00\x02id").unwrap_err();
         assert!(error.contains("level 6"), "{error}");
@@ -454,6 +495,25 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn what_is_counted_is_what_is_cut(packets in proptest::collection::vec((2_u8..16, 0_usize..300), 1..6)) {
+            let mut bytes = Vec::new();
+            for (kind, length) in &packets {
+                bytes.push(kind << 4);
+                if *length > 127 {
+                    bytes.push(u8::try_from(length % 128).unwrap() | 0x80);
+                    bytes.push(u8::try_from(length / 128).unwrap());
+                } else {
+                    bytes.push(u8::try_from(*length).unwrap());
+                }
+                bytes.resize(bytes.len() + length, 0);
+            }
+            let mut reader = Reader::default();
+            reader.push(&bytes);
+            prop_assert_eq!(whole_packets(&bytes).map(|count| count as usize), Some(pieces(&mut reader).len()));
+            prop_assert!(reader.is_between_packets());
+        }
+
         #[test]
         fn pieces_are_the_bytes_received_whatever_they_are(
             bytes in proptest::collection::vec(any::<u8>(), 0..400),

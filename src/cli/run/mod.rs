@@ -121,6 +121,7 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
             .hint("add `--role master-control`")
             .into());
     }
+    super::open_files::allow(arguments.vehicles.unwrap_or_default());
     check_faults(role, &arguments.fault)?;
     let mut job = Job {
         desk: Prompter::new(watch::channel(false).0),

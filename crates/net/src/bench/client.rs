@@ -13,19 +13,18 @@ use rumqttc::{
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
-use super::dial::{Bridge, dial, unreachable};
+use super::dial::{Bridge, SILENT, dial, unreachable};
 use super::endpoint::Endpoint;
 use tck_base::device::Publication;
 
 /// Largest packet taken and sent; rumqttc's own limit of 10 KiB is less than an order can have.
-const LARGEST_PACKET: usize = 256 << 20;
+pub(super) const LARGEST_PACKET: usize = 256 << 20;
 /// How many requests may wait for the connection.
-const REQUESTS: usize = 10_000;
-/// QoS 1 and 2 messages on their way at the same time. rumqttc keeps room for all of them, a hundred bytes each, in every
-/// one of a thousand vehicles.
-const IN_FLIGHT: u16 = 100;
+pub(super) const REQUESTS: usize = 10_000;
+/// QoS 1 and 2 messages on their way at the same time. rumqttc keeps room for all of them, a hundred bytes each.
+pub(super) const IN_FLIGHT: u16 = 100;
 /// How long an orderly end may take.
-const GOODBYE_LIMIT: Duration = Duration::from_secs(2);
+pub(super) const GOODBYE_LIMIT: Duration = Duration::from_secs(2);
 
 /// How a client connects.
 #[derive(Clone, Debug)]
@@ -128,12 +127,17 @@ impl Drop for Client {
     }
 }
 
-fn quality(qos: u8) -> QoS {
+pub(super) fn quality(qos: u8) -> QoS {
     match qos {
         0 => QoS::AtMostOnce,
         1 => QoS::AtLeastOnce,
         _ => QoS::ExactlyOnce,
     }
+}
+
+/// A last will as a CONNECT has it.
+pub(super) fn last_will(will: &Publication) -> LastWill {
+    LastWill::new(will.topic.clone(), will.payload.clone(), quality(will.qos), will.retain)
 }
 
 fn connection(options: &ClientOptions, (host, port): (String, u16)) -> (AsyncClient, EventLoop) {
@@ -144,12 +148,7 @@ fn connection(options: &ClientOptions, (host, port): (String, u16)) -> (AsyncCli
     mqtt.set_clean_session(options.clean_session || options.client_id.is_empty());
     mqtt.set_inflight(IN_FLIGHT);
     if let Some(will) = &options.will {
-        mqtt.set_last_will(LastWill::new(
-            will.topic.clone(),
-            will.payload.clone(),
-            quality(will.qos),
-            will.retain,
-        ));
+        mqtt.set_last_will(last_will(will));
     }
     if let Some(credentials) = &options.endpoint.credentials {
         mqtt.set_credentials(credentials.username.clone(), credentials.password.clone());
@@ -218,11 +217,8 @@ impl Run {
                     }
                 }
                 Event::Incoming(Incoming::SubAck(answer)) => {
-                    let refused = answer.return_codes.iter().zip(&self.subscriptions);
-                    let refused = refused.filter(|(code, _)| **code == SubscribeReasonCode::Failure);
-                    let refused: Vec<&str> = refused.map(|(_, (filter, _))| filter.as_str()).collect();
-                    if !refused.is_empty() {
-                        return self.lost(format!("{REFUSED_SUBSCRIPTION}{}", refused.join(", "))).await;
+                    if let Some(reason) = refused_subscriptions(&answer.return_codes, &self.subscriptions) {
+                        return self.lost(reason).await;
                     }
                     ClientEvent::Connected
                 }
@@ -246,8 +242,16 @@ impl Run {
 /// How a loss begins that is a refused subscription.
 pub(crate) const REFUSED_SUBSCRIPTION: &str = "it refuses the subscription to ";
 
+/// What a broker refuses of these subscriptions, as the end of a sentence about it.
+pub(super) fn refused_subscriptions(codes: &[SubscribeReasonCode], subscriptions: &[(String, u8)]) -> Option<String> {
+    let refused = codes.iter().zip(subscriptions);
+    let refused = refused.filter(|(code, _)| **code == SubscribeReasonCode::Failure);
+    let refused: Vec<&str> = refused.map(|(_, (filter, _))| filter.as_str()).collect();
+    (!refused.is_empty()).then(|| format!("{REFUSED_SUBSCRIPTION}{}", refused.join(", ")))
+}
+
 /// Why a connection is lost, or was never there, as the end of a sentence about the broker.
-fn why(error: &ConnectionError, accepted: bool, endpoint: &Endpoint) -> String {
+pub(super) fn why(error: &ConnectionError, accepted: bool, endpoint: &Endpoint) -> String {
     let user = endpoint.credentials.as_ref().map(|credentials| &credentials.username);
     match error {
         ConnectionError::ConnectionRefused(
@@ -262,7 +266,7 @@ fn why(error: &ConnectionError, accepted: bool, endpoint: &Endpoint) -> String {
             "it does not allow the client id (BadClientId); see `client-id`".to_owned()
         }
         ConnectionError::ConnectionRefused(code) => format!("it refuses the connection ({code:?})"),
-        ConnectionError::NetworkTimeout | ConnectionError::FlushTimeout => "it does not answer".to_owned(),
+        ConnectionError::NetworkTimeout | ConnectionError::FlushTimeout => SILENT.to_owned(),
         ConnectionError::Io(error) if !accepted && is_nobody_there(error) => unreachable(error),
         ConnectionError::Io(_) | ConnectionError::MqttState(_) if !accepted => {
             let hint = match (&endpoint.tls, &endpoint.websocket) {

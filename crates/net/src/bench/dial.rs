@@ -10,6 +10,8 @@ use super::endpoint::Endpoint;
 use super::stream::Stream;
 use super::websocket;
 
+/// Why there is no connection where nobody says anything, as the end of a sentence about the broker.
+pub(crate) const SILENT: &str = "it does not answer";
 /// How long opening a connection may take.
 const LIMIT: Duration = Duration::from_secs(10);
 /// How long the broker may take to close its side once ours is closed.
@@ -21,7 +23,7 @@ const DRAIN_LIMIT: Duration = Duration::from_secs(1);
 /// Why there is none, as the end of a sentence about the broker.
 pub(crate) async fn dial(endpoint: &Endpoint) -> Result<Box<dyn Stream>, String> {
     let opened = tokio::time::timeout(LIMIT, open(endpoint)).await;
-    opened.unwrap_or_else(|_| Err("it does not answer".to_owned()))
+    opened.unwrap_or_else(|_| Err(SILENT.to_owned()))
 }
 
 async fn open(endpoint: &Endpoint) -> Result<Box<dyn Stream>, String> {

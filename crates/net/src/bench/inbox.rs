@@ -5,11 +5,11 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use tokio::sync::{Semaphore, mpsc};
+use tokio::sync::{Semaphore, SemaphorePermit, mpsc};
 
 use super::LinkError;
 use super::heard::Heard;
-use tck_base::clock::WallClock;
+use tck_base::clock::{Stamp, WallClock};
 use tck_journal::event::{Direction, Event, Occurrence, Packet, Source};
 
 /// How many bytes of payload may wait to be read.
@@ -39,6 +39,9 @@ pub struct Reporter {
     turn: Arc<Mutex<()>>,
     heard: Arc<Heard>,
 }
+
+/// Room in the inbox for what is about to be done.
+pub struct Room<'a>(SemaphorePermit<'a>);
 
 /// An inbox and the way into it.
 pub fn inbox(clock: WallClock) -> (Reporter, Inbox) {
@@ -70,11 +73,47 @@ impl Reporter {
         };
         permit.forget();
         let _turn = self.turn.lock().unwrap_or_else(PoisonError::into_inner);
+        self.put(cost, self.clock.now(), source, direction, event);
+    }
+
+    /// Room for the events of so many packets with so many bytes. Waits while the inbox is full.
+    pub async fn room(&self, packets: u32, bytes: usize) -> Option<Room<'_>> {
+        let bytes = u32::try_from(bytes).unwrap_or(ROOM);
+        let cost = packets.saturating_mul(OVERHEAD).saturating_add(bytes).min(ROOM);
+        self.room.acquire_many(cost).await.ok().map(Room)
+    }
+
+    /// Does something quick, and reports it with the time before it. What others report stands before or behind all of it: what
+    /// comes of it cannot stand before it in the journal.
+    pub fn report_behind<T>(
+        &self,
+        room: Room<'_>,
+        source: Source,
+        direction: Option<Direction>,
+        act: impl FnOnce() -> (T, Vec<Event>),
+    ) -> T {
+        let mut left = u32::try_from(room.0.num_permits()).unwrap_or(ROOM);
+        room.0.forget();
+        let turn = self.turn.lock().unwrap_or_else(PoisonError::into_inner);
+        let at = self.clock.now();
+        let (done, events) = act();
+        for event in events {
+            let cost = cost(&event).min(left);
+            left -= cost;
+            self.put(cost, at, source, direction, event);
+        }
+        drop(turn);
+        self.room.add_permits(left as usize);
+        done
+    }
+
+    /// Puts an event in; who calls this has the turn.
+    fn put(&self, cost: u32, at: Stamp, source: Source, direction: Option<Direction>, event: Event) {
         if let Event::Message { topic, payload, .. } = &event {
             self.heard.note(topic, payload.bytes());
         }
         let occurrence = Occurrence {
-            at: self.clock.now(),
+            at,
             source,
             direction,
             event,
@@ -173,6 +212,52 @@ mod tests {
             matches!(inbox.next().await, Err(LinkError::Setup(_))),
             "the writers are gone"
         );
+    }
+
+    #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+    async fn what_follows_from_an_act_stands_behind_it_though_it_is_reported_first() {
+        let (reporter, mut inbox) = inbox(WallClock::start());
+        let note = |text: &str| Event::Note { text: text.to_owned() };
+        for _ in 0..50 {
+            let (told, tell) = std::sync::mpsc::channel::<()>();
+            let other = reporter.clone();
+            let follows = std::thread::spawn(move || {
+                tell.recv().unwrap();
+                let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+                runtime.block_on(other.report(
+                    Source::Link,
+                    None,
+                    Event::Note {
+                        text: "heard".to_owned(),
+                    },
+                ));
+            });
+            let room = reporter.room(2, 10).await.unwrap();
+            let acted = reporter.report_behind(room, Source::Tap, None, || {
+                told.send(()).unwrap();
+                std::thread::sleep(Duration::from_millis(1));
+                (7, vec![note("sent"), note("and more")])
+            });
+            assert_eq!(acted, 7);
+            follows.join().unwrap();
+            let mut texts = Vec::new();
+            while let Some(occurrence) = inbox.ready().unwrap() {
+                texts.push(occurrence.event);
+            }
+            assert_eq!(texts, [note("sent"), note("and more"), note("heard")]);
+        }
+    }
+
+    #[tokio::test]
+    async fn room_that_is_not_needed_is_given_back() {
+        let (reporter, mut inbox) = inbox(WallClock::start());
+        for _ in 0..10 {
+            let room = reporter.room(1, ROOM as usize).await.unwrap();
+            reporter.report_behind(room, Source::Tap, None, || ((), vec![big()]));
+            assert!(inbox.next().await.is_ok());
+        }
+        drop(reporter.room(1, ROOM as usize).await);
+        assert!(reporter.room(1, ROOM as usize).await.is_some());
     }
 
     #[tokio::test]

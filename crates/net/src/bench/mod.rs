@@ -4,10 +4,12 @@
 pub mod client;
 pub mod dial;
 pub mod endpoint;
+mod flow;
 mod heard;
 pub mod inbox;
 pub mod kin;
 pub mod leavings;
+pub mod light;
 pub mod listen;
 pub mod own;
 pub mod patience;

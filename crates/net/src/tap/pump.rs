@@ -2,11 +2,16 @@
 //!
 //! A packet from the device is reported when it arrives, whatever becomes of it; a packet to the device when it
 //! goes on, because only then does the device get it.
+//!
+//! Where no fault is in force, whole packets are forwarded first, and decoded and reported behind that: nobody waits for the
+//! journal, and nobody's report of what comes of them can stand before theirs.
 
 use std::collections::VecDeque;
 use std::io;
+use std::pin::Pin;
 use std::sync::PoisonError;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering::Relaxed};
+use std::task::Poll;
 use std::time::Duration;
 
 use bytes::{Bytes, BytesMut};
@@ -135,9 +140,11 @@ impl<'a> Pump<'a> {
                             self.end(Ok(())).await;
                         }
                         Ok(_) => {
-                            self.reader.push(&bytes);
+                            if !self.run_ahead(&bytes, &mut to).await {
+                                self.reader.push(&bytes);
+                                self.take_pieces().await;
+                            }
                             bytes.clear();
-                            self.take_pieces().await;
                         }
                         Err(error) => {
                             ended = true;
@@ -197,51 +204,70 @@ impl<'a> Pump<'a> {
         self.both.changed.notify_one();
     }
 
-    async fn take_pieces(&mut self) {
-        if self.direction == Direction::ToDevice
-            && let level @ 1.. = self.both.level.load(Relaxed)
-        {
-            self.reader.set_level(level);
+    /// Forwards what was read before it is decoded and reported, where nothing stands before it and nothing may become of it but
+    /// that. What the other side does not take at once is put in line. False when it has to be looked at first.
+    async fn run_ahead<W: AsyncWrite + Unpin>(&mut self, bytes: &[u8], to: &mut W) -> bool {
+        let shared = self.shared;
+        let begun = self.both.has_begun() && self.both.connect_forwarded.load(Relaxed);
+        if !begun || !self.held.is_empty() || !self.reader.is_between_packets() {
+            return false;
         }
-        while let Some(piece) = self.reader.next_piece() {
-            self.take(piece).await;
+        let Some(packets) = tck_wire::whole_packets(bytes) else {
+            return false;
+        };
+        let mut room = shared.reporter.room(packets, bytes.len()).await;
+        if !self.faults(|faults| faults.lets_all_by(self.direction)) {
+            return false;
         }
+        let taken = std::future::poll_fn(|context| {
+            let Some(room) = room.take() else {
+                return Poll::Ready(None);
+            };
+            let taken = shared
+                .reporter
+                .report_behind(room, Source::Tap, Some(self.direction), || {
+                    let taken = Pin::new(&mut *to).poll_write(context, bytes);
+                    (taken, self.decoded(bytes))
+                });
+            Poll::Ready(Some(taken))
+        });
+        let taken = match taken.await {
+            None => return false,
+            Some(Poll::Pending) => 0,
+            Some(Poll::Ready(Ok(taken))) => taken,
+            // The other side is gone; its own direction says how.
+            Some(Poll::Ready(Err(_))) => return true,
+        };
+        if let Some(rest @ [_, ..]) = bytes.get(taken..) {
+            self.hold(Held {
+                due: Instant::now(),
+                raw: Bytes::copy_from_slice(rest),
+                report: None,
+                is_connect: false,
+            });
+        }
+        true
     }
 
-    /// Reports a piece where that is due, asks what becomes of it, and puts it in line.
-    async fn take(&mut self, piece: Piece) {
+    /// Whole packets as the journal has them.
+    fn decoded(&mut self, bytes: &[u8]) -> Vec<Event> {
+        self.learn_level();
+        self.reader.push(bytes);
+        let mut events = Vec::new();
+        while let Some(piece) = self.reader.next_piece() {
+            let evidence = piece.evidence();
+            events.extend(self.told(piece.content, evidence));
+        }
+        events
+    }
+
+    /// A piece as the journal has it; nothing of too much garbage.
+    fn told(&mut self, content: Result<Packet, String>, evidence: Bytes) -> Option<Event> {
         let connection = self.connection;
-        let mut fate = Fate::Forward;
-        let mut is_connect = false;
-        let evidence = piece.evidence();
-        let event = match piece.content {
-            Ok(packet) => {
-                match &packet {
-                    Packet::Publish { topic, .. } => {
-                        fate = self.faults(|faults| faults.fate_of_publish(self.direction, topic));
-                        if fate != Fate::Forward {
-                            let what = if fate == Fate::Swallow {
-                                "swallowed"
-                            } else {
-                                "sent on twice"
-                            };
-                            self.report(Event::Note {
-                                text: format!("a PUBLISH on {topic} was {what}"),
-                            })
-                            .await;
-                        }
-                    }
-                    Packet::Connect { level, .. } => {
-                        is_connect = true;
-                        self.both.level.store(*level, Relaxed);
-                    }
-                    _ => {}
-                }
-                Some(Event::Packet { connection, packet })
-            }
+        match content {
+            Ok(packet) => Some(Event::Packet { connection, packet }),
             Err(reason) => {
                 self.garbage += 1;
-                is_connect = piece.raw.first().is_some_and(|first| first >> 4 == 1);
                 let bytes = Payload::keep(evidence);
                 (self.garbage <= GARBAGE_LIMIT).then_some(Event::Undecodable {
                     connection,
@@ -249,7 +275,53 @@ impl<'a> Pump<'a> {
                     bytes,
                 })
             }
-        };
+        }
+    }
+
+    /// The direction towards the device is read as the CONNECT of the device has it.
+    fn learn_level(&mut self) {
+        if self.direction == Direction::ToDevice
+            && let level @ 1.. = self.both.level.load(Relaxed)
+        {
+            self.reader.set_level(level);
+        }
+    }
+
+    async fn take_pieces(&mut self) {
+        self.learn_level();
+        while let Some(piece) = self.reader.next_piece() {
+            self.take(piece).await;
+        }
+    }
+
+    /// Reports a piece where that is due, asks what becomes of it, and puts it in line.
+    async fn take(&mut self, piece: Piece) {
+        let mut fate = Fate::Forward;
+        let mut is_connect = false;
+        let evidence = piece.evidence();
+        match &piece.content {
+            Ok(Packet::Publish { topic, .. }) => {
+                fate = self.faults(|faults| faults.fate_of_publish(self.direction, topic));
+                if fate != Fate::Forward {
+                    let what = if fate == Fate::Swallow {
+                        "swallowed"
+                    } else {
+                        "sent on twice"
+                    };
+                    self.report(Event::Note {
+                        text: format!("a PUBLISH on {topic} was {what}"),
+                    })
+                    .await;
+                }
+            }
+            Ok(Packet::Connect { level, .. }) => {
+                is_connect = true;
+                self.both.level.store(*level, Relaxed);
+            }
+            Ok(_) => {}
+            Err(_) => is_connect = piece.raw.first().is_some_and(|first| first >> 4 == 1),
+        }
+        let event = self.told(piece.content, evidence);
         let report = match self.direction {
             Direction::ToDevice => event,
             Direction::FromDevice => {
@@ -362,4 +434,145 @@ fn again(raw: &Bytes, report: Option<Event>) -> (Bytes, Option<Event>) {
 
 async fn sleep_until(due: Option<Instant>) {
     tokio::time::sleep_until(due.unwrap_or_else(|| Instant::now() + Duration::from_secs(3600))).await;
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use tokio::io::{DuplexStream, duplex};
+
+    use super::*;
+    use crate::bench::endpoint::Endpoint;
+    use crate::bench::inbox::{Inbox, inbox};
+    use crate::bench::kin::Kin;
+    use crate::tap::Upstream;
+    use tck_base::clock::WallClock;
+    use tck_journal::event::LinkFault;
+
+    const CONNECT: &[u8] = b"\x10\x0e\x00\x04MQTT\x04\x02\x00\x00\x00\x02id";
+
+    fn shared() -> (Shared, Inbox) {
+        let (reporter, inbox) = inbox(WallClock::start());
+        let broker = Endpoint::plain(([127, 0, 0, 1], 1).into());
+        let shared = Shared {
+            reporter,
+            upstream: Upstream {
+                broker,
+                embedded: false,
+            },
+            tls: None,
+            kin: Kin::default(),
+            faults: Mutex::default(),
+            control: watch::Sender::default(),
+            open: watch::Sender::default(),
+        };
+        (shared, inbox)
+    }
+
+    fn publish(number: u8, size: usize) -> Vec<u8> {
+        let length = size + 3;
+        let mut packet = vec![0x30];
+        if length > 127 {
+            packet.push(u8::try_from(length % 128).unwrap() | 0x80);
+            packet.push(u8::try_from(length / 128).unwrap());
+        } else {
+            packet.push(u8::try_from(length).unwrap());
+        }
+        packet.extend_from_slice(b"\x00\x01t");
+        packet.resize(packet.len() + size, number);
+        packet
+    }
+
+    /// Sizes of the payloads that were reported.
+    fn reported(inbox: &mut Inbox) -> Vec<usize> {
+        let mut sizes = Vec::new();
+        while let Some(occurrence) = inbox.ready().unwrap() {
+            if let Event::Packet {
+                packet: Packet::Publish { payload, .. },
+                ..
+            } = occurrence.event
+            {
+                sizes.push(payload.bytes().len());
+            }
+        }
+        sizes
+    }
+
+    #[tokio::test]
+    async fn all_bytes_go_on_and_all_packets_are_reported_in_order_however_they_come() {
+        let sizes: Vec<usize> = (0..40).map(|number| number * 90).collect();
+        let packets = sizes.iter().map(|size| publish(1, *size));
+        let sent = std::iter::once(CONNECT.to_vec())
+            .chain(packets)
+            .collect::<Vec<_>>()
+            .concat();
+        for (chunk, room) in [
+            (1, 1 << 16),
+            (7, 64),
+            (1_000, 64),
+            (1_000, 1 << 16),
+            (usize::MAX, 64),
+            (usize::MAX, 1 << 16),
+        ] {
+            let (shared, mut inbox) = shared();
+            let both = Both::default();
+            let mut pump = Pump::new(&shared, &both, 1, Direction::FromDevice);
+            let (mut device, from) = duplex(1 << 20);
+            let (to, mut broker) = duplex(room);
+            let send = async {
+                for part in sent.chunks(chunk) {
+                    device.write_all(part).await.unwrap();
+                    tokio::task::yield_now().await;
+                }
+                device.shutdown().await.unwrap();
+            };
+            let receive = async {
+                let mut got = Vec::new();
+                broker.read_to_end(&mut got).await.unwrap();
+                got
+            };
+            let ((), (), got) = tokio::join!(send, pump.run(from, to, shared.control.subscribe()), receive);
+            assert!(got == sent, "{chunk} bytes at once, room for {room}");
+            assert_eq!(reported(&mut inbox), sizes, "{chunk} bytes at once, room for {room}");
+        }
+    }
+
+    /// The device sends this, and the broker gets that.
+    async fn sends(ends: (&mut DuplexStream, &mut DuplexStream), packets: &[Vec<u8>], expected: &[u8]) {
+        let (device, broker) = ends;
+        device.write_all(&packets.concat()).await.unwrap();
+        let mut got = vec![0; expected.len()];
+        broker.read_exact(&mut got).await.unwrap();
+        assert_eq!(got, expected);
+    }
+
+    #[tokio::test]
+    async fn a_fault_takes_hold_of_the_next_packet_although_the_ones_before_ran_ahead() {
+        let (shared, mut inbox) = shared();
+        let both = Both::default();
+        let mut pump = Pump::new(&shared, &both, 1, Direction::FromDevice);
+        let (mut device, from) = duplex(1 << 16);
+        // Less than a packet: what is not taken at once goes on later.
+        let (to, mut broker) = duplex(16);
+        let talk = async {
+            sends((&mut device, &mut broker), &[CONNECT.to_vec()], CONNECT).await;
+            sends((&mut device, &mut broker), &[publish(1, 10)], &publish(1, 10)).await;
+            shared.faults.lock().unwrap().apply(&LinkFault::Drop {
+                topic: None,
+                count: 1,
+                direction: None,
+            });
+            sends(
+                (&mut device, &mut broker),
+                &[publish(2, 20), publish(3, 30)],
+                &publish(3, 30),
+            )
+            .await;
+            sends((&mut device, &mut broker), &[publish(4, 40)], &publish(4, 40)).await;
+            device.shutdown().await.unwrap();
+        };
+        tokio::join!(talk, pump.run(from, to, shared.control.subscribe()));
+        assert_eq!(reported(&mut inbox), [10, 20, 30, 40]);
+    }
 }

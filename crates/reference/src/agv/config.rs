@@ -6,6 +6,7 @@
 //! (ORD-FLOW-01, ORD-FLOW-04, ORD-REJ-15, CORR-07).
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::read::MAX_STRING;
@@ -153,8 +154,8 @@ pub struct AgvConfig {
     pub minimal_factsheet: bool,
     /// Predefined actions this vehicle does *not* offer.
     pub without_actions: BTreeSet<String>,
-    /// Nodes the vehicle knows the position of.
-    pub nodes: Vec<LayoutNode>,
+    /// Nodes the vehicle knows the position of. Vehicles of one site share them.
+    pub nodes: Arc<[LayoutNode]>,
     /// The node it stands on when it is switched on for the first time.
     pub start_node: String,
     /// The zone set it plans with, if it knows zones.
@@ -267,7 +268,7 @@ impl Default for AgvConfig {
             errors: ErrorNames::default(),
             minimal_factsheet: false,
             without_actions: BTreeSet::new(),
-            nodes,
+            nodes: nodes.into(),
             start_node: "n1".into(),
             zone_set: None,
             speed: 2.0,

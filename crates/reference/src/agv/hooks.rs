@@ -86,6 +86,8 @@ hooks! {
     ref due() -> Option<Moment> = own(None);
     /// Something has happened, or is about to.
     mut happens(event: Event) = each;
+    /// Whether it may do anything otherwise before somebody tells it to.
+    ref stirs() -> bool = own(true);
 }
 
 impl Agv {
@@ -161,6 +163,11 @@ impl Agv {
     /// Lists the error of an action that has failed.
     pub(crate) fn raise_failure(&mut self, action: Option<&Action>, error: ActiveError) {
         self.raise(Cause::Failure(action), error);
+    }
+
+    /// Whether everything stays as usual until something comes in.
+    pub(crate) fn is_left_alone(&self) -> bool {
+        !self.hooks.iter().any(|hook| hook.stirs(self))
     }
 
     /// When a deviation wants to be told that time has passed.

@@ -59,7 +59,7 @@ use hooks::SwitchedOn;
 use maps::Maps;
 use motion::{Motion, Pose};
 use order_state::OrderState;
-use report::Report;
+use report::{Report, Rest};
 
 /// operatingMode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -139,6 +139,8 @@ pub struct Agv {
     pub(crate) charger_locked: bool,
     pub(crate) connection: Connection,
     pub(crate) report: Report,
+    /// What it repeats while nothing can change.
+    pub(crate) rest: Rest,
     /// Messages and commands that were not looked at yet, and when they will be.
     pub(crate) inbox: VecDeque<(Moment, Input)>,
     /// It stands still until then.
@@ -201,6 +203,7 @@ impl Agv {
             charger_locked: false,
             connection: Connection::new(),
             report: Report::default(),
+            rest: Rest::default(),
             inbox: VecDeque::new(),
             lingers_until: None,
             states_sent: 0,
@@ -245,6 +248,10 @@ impl Agv {
 
     /// What is due at the present moment.
     fn step(&mut self) {
+        if self.rest.lasts {
+            self.repeat();
+            return;
+        }
         let moment = self.moment();
         if let Some(rolled) = self.motion.finish(moment) {
             self.leg_finished(rolled);
@@ -266,6 +273,7 @@ impl Agv {
         self.settle();
         self.happens(hooks::Event::Settled);
         self.flush();
+        self.rest = Rest::begins(self.comes_to_rest());
     }
 }
 
@@ -276,6 +284,9 @@ impl Device for Agv {
 
     fn handle(&mut self, now: Stamp, input: Input, out: &mut Vec<Output>) {
         self.advance(now);
+        if !matches!(input, Input::Time) {
+            self.wake();
+        }
         match input {
             Input::Connected => self.connected(),
             Input::ConnectionLost => self.connection_lost(),

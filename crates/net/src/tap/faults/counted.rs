@@ -28,6 +28,11 @@ impl Counted {
         }
     }
 
+    /// Whether no packet is touched.
+    pub(super) fn is_empty(&self) -> bool {
+        self.rules.is_empty()
+    }
+
     /// Whether a rule covers this packet; if so, it is counted.
     pub(super) fn take(&mut self, direction: Direction, topic: &str) -> bool {
         let last_level = topic.rsplit('/').next().unwrap_or(topic);

@@ -93,6 +93,15 @@ impl Faults {
         self.delay.of(direction)
     }
 
+    /// Whether everything going in `direction` goes on at once and as it is.
+    #[must_use]
+    pub fn lets_all_by(&self, direction: Direction) -> bool {
+        !self.is_silent(direction)
+            && self.delay(direction).is_zero()
+            && self.drop.is_empty()
+            && self.duplicate.is_empty()
+    }
+
     /// What becomes of a PUBLISH on `topic`. Counts it.
     pub fn fate_of_publish(&mut self, direction: Direction, topic: &str) -> Fate {
         if self.drop.take(direction, topic) {
@@ -108,4 +117,37 @@ impl Faults {
 /// Which of the two directions something applies to; both when none is named.
 fn applies(named: Option<Direction>, to: Direction) -> bool {
     named.is_none_or(|named| named == to)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn everything_goes_by_until_a_fault_touches_it_and_again_afterwards() {
+        let counted = |topic| LinkFault::Drop {
+            topic,
+            count: 1,
+            direction: None,
+        };
+        for fault in [
+            LinkFault::Silence { direction: None },
+            LinkFault::Delay {
+                millis: 1,
+                direction: None,
+            },
+            counted(Some("state".to_owned())),
+        ] {
+            let mut faults = Faults::default();
+            assert!(faults.lets_all_by(Direction::FromDevice));
+            faults.apply(&fault);
+            assert!(!faults.lets_all_by(Direction::FromDevice), "{fault:?}");
+            faults.apply(&LinkFault::Restore);
+            assert!(faults.lets_all_by(Direction::FromDevice), "{fault:?}");
+        }
+        let mut faults = Faults::default();
+        faults.apply(&counted(None));
+        assert_eq!(faults.fate_of_publish(Direction::ToDevice, "t"), Fate::Swallow);
+        assert!(faults.lets_all_by(Direction::ToDevice));
+    }
 }

@@ -6,7 +6,10 @@
 //! also a refused one (that of STATE-03).
 
 mod picture;
+mod rest;
 mod route;
+
+pub(crate) use rest::Rest;
 
 use std::time::Duration;
 
@@ -38,6 +41,12 @@ pub(crate) struct Report {
 }
 
 impl Report {
+    /// Whether the last state is all there is to say.
+    fn is_complete(&self) -> bool {
+        let open = self.order_received || self.requested || self.silenced || self.delayed;
+        self.last.is_some() && self.silent_until.is_none() && !open
+    }
+
     /// Whether the state that is sent now answers a request, and is not the first one.
     pub(crate) fn answers_request(&self) -> bool {
         self.requested && self.last.is_some()
@@ -170,14 +179,21 @@ impl Agv {
             return;
         }
         self.flush_state();
-        let moment = self.moment();
-        if let Some(interval) = self.visualization_interval()
-            && self.report.next_visualization.is_some_and(|next| next <= moment)
-        {
-            let next = self.report.next_visualization.map_or(moment, |next| next + interval);
-            self.report.next_visualization = Some(if next > moment { next } else { moment + interval });
+        if self.takes_visualization() {
             self.publish_visualization();
         }
+    }
+
+    /// Whether a visualization is due now; the next one is then later.
+    fn takes_visualization(&mut self) -> bool {
+        let moment = self.moment();
+        let due = self.report.next_visualization.filter(|next| *next <= moment);
+        let (Some(due), Some(interval)) = (due, self.visualization_interval()) else {
+            return false;
+        };
+        let next = due + interval;
+        self.report.next_visualization = Some(if next > moment { next } else { moment + interval });
+        true
     }
 
     fn flush_state(&mut self) {

@@ -13,6 +13,7 @@ mod orders;
 mod people;
 mod personas;
 mod rejections;
+mod rest;
 mod scenarios;
 
 use std::time::Duration;

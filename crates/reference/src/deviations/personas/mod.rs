@@ -34,7 +34,7 @@ pub(super) fn persona() -> Box<dyn Deviation> {
 }
 
 /// What a test has told the vehicle; nothing by default.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 struct Persona {
     /// Messages lie so long before they are looked at.
     answers_after: Option<Duration>,
@@ -191,6 +191,10 @@ impl Deviation for Persona {
 
     fn due(&self, _: &Agv) -> Option<Moment> {
         self.cancel_held_until
+    }
+
+    fn stirs(&self, _: &Agv) -> bool {
+        *self != Self::default()
     }
 
     fn happens(&mut self, agv: &mut Agv, event: Event) {

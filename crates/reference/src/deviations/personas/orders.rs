@@ -10,7 +10,7 @@ use crate::agv::order_message::Order;
 use crate::agv::rejection::message_references;
 
 /// How orders are rejected, and how many still are.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Rejection {
     error_type: String,
     references: bool,
