@@ -15,7 +15,7 @@ use tck_base::device::Publication;
 use tck_base::pattern::Bindings;
 use tck_judge::Ground;
 use tck_suite::model::{Patch, Raw, Send, SendAction};
-use tck_view::{FactsheetView, OfferedAction, OrderView};
+use tck_view::{FactsheetView, OfferedAction, OrderView, Topic};
 
 /// A finished message and the actionIds in it, by the names given with `as`.
 #[derive(Debug)]
@@ -120,6 +120,10 @@ impl Composer {
         if let Value::Object(members) = members {
             message.extend(members);
         }
+        ground
+            .pack
+            .names()
+            .spell_members(Topic::of_name(topic).object(), &mut message);
         Ok(Publication {
             topic: full,
             payload: Value::Object(message).to_string().into_bytes().into(),
@@ -139,7 +143,7 @@ impl Composer {
         let mut message = self.header(&send.topic, ground, now);
         let payload = send.payload.as_ref().map(|term| term.bind(bindings)).transpose()?;
         if !send.actions.is_empty() {
-            let list = self.actions(&send.actions, true, bindings, actions)?;
+            let list = self.actions(&send.actions, instant_blocking(ground), bindings, actions)?;
             message.insert("actions".to_owned(), Value::Array(list));
         }
         if let Some(route) = &send.route {
@@ -153,7 +157,13 @@ impl Composer {
             message.insert("orderUpdateId".to_owned(), json!(0));
             let mut placed = BTreeMap::new();
             for (at, (place, list)) in route.actions.iter().enumerate() {
-                placed.insert(at, (place.clone(), self.actions(list, false, bindings, actions)?));
+                placed.insert(
+                    at,
+                    (
+                        place.clone(),
+                        self.actions(list, InstantBlocking::No, bindings, actions)?,
+                    ),
+                );
             }
             let builder = RouteBuilder {
                 course: bindings.get("course"),
@@ -168,14 +178,37 @@ impl Composer {
         if let Some(payload) = payload {
             json_patch::merge(&mut message, &payload);
         }
+        let (names, object) = (ground.pack.names(), Topic::of_name(&send.topic).object());
+        names.spell(object, &mut message);
         match &send.patch {
             None => {}
-            Some(Patch::Merge(term)) => json_patch::merge(&mut message, &term.bind(bindings)?),
+            Some(Patch::Merge(term)) => {
+                let mut patch = term.bind(bindings)?;
+                names.spell(object, &mut patch);
+                json_patch::merge(&mut message, &patch);
+            }
             Some(Patch::Operations(term)) => {
                 let Value::Array(operations) = term.bind(bindings)? else {
                     return Err(ComposeError::Patch("it is no list of operations".to_owned()));
                 };
-                for operation in operations {
+                for mut operation in operations {
+                    let at = operation
+                        .get("path")
+                        .and_then(Value::as_str)
+                        .unwrap_or_default()
+                        .to_owned();
+                    // What keeps an order in one piece need not be done where there is no such member.
+                    if names.has_lost(object, &at) {
+                        continue;
+                    }
+                    if let Some(value) = operation.get_mut("value") {
+                        names.spell_at(object, &at, value);
+                    }
+                    for place in ["path", "from"] {
+                        if let Some(Value::String(path)) = operation.get_mut(place) {
+                            *path = names.spelled_path(object, path);
+                        }
+                    }
                     operate(&mut message, operation)?;
                 }
             }
@@ -186,7 +219,7 @@ impl Composer {
     fn actions(
         &mut self,
         list: &[SendAction],
-        instant: bool,
+        instant: InstantBlocking,
         bindings: &Bindings,
         named: &mut Vec<(String, String)>,
     ) -> Result<Vec<Value>, ComposeError> {
@@ -214,7 +247,8 @@ impl Composer {
             let action_type = action.action.bind(bindings)?;
             let blocking = action.blocking.as_ref().map(|term| term.bind(bindings)).transpose()?;
             let blocking = match blocking {
-                Some(said) if !instant => said,
+                Some(said) if instant == InstantBlocking::No => said,
+                _ if instant == InstantBlocking::Never => json!("NONE"),
                 // How an instant action blocks is nothing a test is about.
                 said => usual_blocking(
                     &action_type,
@@ -239,7 +273,7 @@ impl Composer {
         let id = self.header_ids.entry(topic.to_owned()).or_default();
         let header = json!({
             "headerId": *id,
-            "timestamp": timestamp(now),
+            "timestamp": timestamp(now, ground.pack.timestamp_digits()),
             "version": ground.pack.version.to_string(),
             "manufacturer": ground.identity.0,
             "serialNumber": ground.identity.1,
@@ -249,6 +283,24 @@ impl Composer {
             Value::Object(members) => members,
             _ => Map::new(),
         }
+    }
+}
+
+/// Whether actions are instant ones, and how those may block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum InstantBlocking {
+    /// They are actions of an order.
+    No,
+    /// As their factsheet lists.
+    Listed,
+    /// Not at all.
+    Never,
+}
+
+fn instant_blocking(ground: &Ground) -> InstantBlocking {
+    match ground.pack.has("instantActionsNeverBlock") {
+        true => InstantBlocking::Never,
+        false => InstantBlocking::Listed,
     }
 }
 
@@ -271,9 +323,9 @@ fn operate(message: &mut Value, operation: Value) -> Result<(), ComposeError> {
     json_patch::patch(message, &operations).map_err(|error| ComposeError::Patch(error.to_string()))
 }
 
-/// ISO 8601 in UTC with two fraction digits (HDR-03).
-fn timestamp(now: Stamp) -> String {
-    format!("{:.2}", now.utc)
+/// ISO 8601 in UTC with so many fraction digits (HDR-03).
+fn timestamp(now: Stamp, digits: usize) -> String {
+    format!("{:.digits$}", now.utc)
 }
 
 /// How an action blocks where a test does not care: the usual way, or the first type its factsheet lists when the usual
@@ -309,12 +361,13 @@ mod tests {
     }
 
     #[test]
-    fn the_timestamp_has_two_fraction_digits_and_a_z() {
+    fn the_timestamp_has_the_fraction_digits_of_its_version_and_a_z() {
         let utc = "2026-11-21T09:16:24.129Z".parse().expect("timestamp");
         let stamp = Stamp {
             moment: Moment::START,
             utc,
         };
-        assert_eq!(timestamp(stamp), "2026-11-21T09:16:24.12Z");
+        assert_eq!(timestamp(stamp, 2), "2026-11-21T09:16:24.12Z");
+        assert_eq!(timestamp(stamp, 3), "2026-11-21T09:16:24.129Z");
     }
 }

@@ -88,7 +88,7 @@ pub use json::{Json, Kind};
 pub use list::List;
 pub use member::{Member, Presence, Shown};
 pub use message::{MessageView, OtherView};
-pub use names::{Field, Names, NamesError, Object};
+pub use names::{Field, Names, NamesError, Object, Spelling};
 pub use number::Number;
 pub use order::{Corridor, Edge, Element, Node, OrderView, Scope};
 pub use position::{Deviation, Ellipse, NodePosition, Pose, Position, Spot, Velocity};

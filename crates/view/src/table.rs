@@ -74,6 +74,7 @@ macro_rules! view {
                     wire: $wire,
                     later: view!(@has $($later)?),
                     apart: view!(@has $($apart)?),
+                    holds: <$type as $crate::read::Readable>::HOLDS,
                 } ),*],
             };
 
@@ -134,6 +135,8 @@ macro_rules! view {
         }
 
         impl $crate::read::Readable for $name {
+            const HOLDS: Option<$crate::Object> = Some($crate::Object::$name);
+
             fn read_object<'de, A: serde::de::MapAccess<'de>>(
                 slot: &mut $crate::Member<Self>,
                 object: A,
@@ -144,6 +147,8 @@ macro_rules! view {
         }
 
         impl $crate::read::Readable for Box<$name> {
+            const HOLDS: Option<$crate::Object> = Some($crate::Object::$name);
+
             fn read_object<'de, A: serde::de::MapAccess<'de>>(
                 slot: &mut $crate::Member<Self>,
                 object: A,

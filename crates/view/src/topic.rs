@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::Object;
+
 /// Which kind of message a topic carries, as a number rather than a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Topic {
@@ -43,6 +45,22 @@ impl Topic {
     pub fn of_name(name: &str) -> Self {
         let named = |topic: &Self| topic.as_str() == name;
         Self::KNOWN.into_iter().find(named).unwrap_or(Self::Other)
+    }
+
+    /// The kind of object that its messages are.
+    #[must_use]
+    pub const fn object(self) -> Object {
+        match self {
+            Self::Order => Object::OrderView,
+            Self::InstantActions => Object::InstantActionsView,
+            Self::State => Object::StateView,
+            Self::Visualization => Object::VisualizationView,
+            Self::Connection => Object::ConnectionView,
+            Self::Factsheet => Object::FactsheetView,
+            Self::Responses => Object::ResponsesView,
+            Self::ZoneSet => Object::ZoneSetView,
+            Self::Other => Object::OtherView,
+        }
     }
 
     /// The last level of the topic; empty for [`Topic::Other`].

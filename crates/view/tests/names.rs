@@ -204,3 +204,104 @@ fn every_member_of_the_schemas_can_be_read() {
     }
     assert!(seen > 400, "{seen}");
 }
+
+/// The names of 3.0, as its pack has them.
+fn of_3_0() -> Names {
+    let protocol = include_str!("../../../schemas/3.0/protocol.toml");
+    let mut protocol: toml::Table = toml::from_str(protocol).unwrap();
+    protocol.remove("members").unwrap().try_into().unwrap()
+}
+
+#[test]
+fn a_message_told_by_usual_names_is_written_as_the_version_writes_it_and_back() {
+    let names = of_3_0();
+    let told = json!({
+        "headerId": 1, "orderId": "o",
+        "agvPosition": { "x": 1.0, "positionInitialized": true },
+        "batteryState": { "batteryCharge": 50.0 },
+        "operatingMode": "TEACHIN",
+        "actionStates": [{ "actionId": "a", "actionType": "initPosition", "resultDescription": "r" }],
+        "instantActionStates": [],
+        "unknown": { "agvPosition": 1 },
+    });
+    let mut written = told.clone();
+    names.spell(Topic::State.object(), &mut written);
+    assert_eq!(
+        written,
+        json!({
+            "headerId": 1, "orderId": "o",
+            "mobileRobotPosition": { "x": 1.0, "localized": true },
+            "powerSupply": { "stateOfCharge": 50.0 },
+            "operatingMode": "TEACH_IN",
+            "actionStates": [{ "actionId": "a", "actionType": "initializePosition", "actionResult": "r" }],
+            "instantActionStates": [],
+            "unknown": { "agvPosition": 1 },
+        })
+    );
+    names.unspell(Topic::State.object(), &mut written);
+    assert_eq!(written, told);
+    let mut order = json!({ "nodes": [
+        { "nodePosition": { "x": 1, "allowedDeviationXY": { "a": 2.0, "b": 0.5, "theta": 0.1 } } },
+        { "nodePosition": { "x": 1, "allowedDeviationXY": 2.0 } },
+    ] });
+    names.unspell(Topic::Order.object(), &mut order);
+    let radius = |at: usize| order["nodes"][at]["nodePosition"]["allowedDeviationXY"].clone();
+    assert_eq!(
+        (radius(0), radius(1)),
+        (json!(0.5), Value::Null),
+        "a radius is no ellipse"
+    );
+    let mut of_2_x = json!({ "agvPosition": {}, "zoneSetId": "z", "orderId": "o" });
+    names.unspell(Topic::State.object(), &mut of_2_x);
+    assert_eq!(
+        of_2_x,
+        json!({ "orderId": "o" }),
+        "what the version does not have is no member of it"
+    );
+}
+
+#[test]
+fn a_radius_is_written_as_an_ellipse_and_a_lacking_member_is_left_out() {
+    let mut place = json!({ "x": 1, "allowedDeviationXY": 2 });
+    of_3_0().spell_at(Topic::Order.object(), "/nodes/1/nodePosition", &mut place);
+    assert_eq!(place["allowedDeviationXY"]["b"], json!(2));
+    assert!(of_3_0().has_lost(Topic::Order.object(), "/edges/0/startNodeId"));
+    let mut order = json!({ "zoneSetId": "z", "nodes": [{ "nodePosition": { "x": 0, "allowedDeviationXY": 0.5 } }],
+        "edges": [{ "startNodeId": "a", "maxSpeed": 1.0 }] });
+    of_3_0().spell(Topic::Order.object(), &mut order);
+    let ellipse = json!({ "a": 0.5, "b": 0.5, "theta": 0.0 });
+    assert_eq!(
+        order,
+        json!({ "nodes": [{ "nodePosition": { "x": 0, "allowedDeviationXY": ellipse } }], "edges": [{ "maximumSpeed": 1.0 }] })
+    );
+}
+
+#[test]
+fn paths_are_written_as_the_version_writes_them() {
+    let (names, state, order) = (of_3_0(), Topic::State.object(), Topic::Order.object());
+    assert_eq!(names.spelled_path(state, "agvPosition.x"), "mobileRobotPosition.x");
+    assert_eq!(
+        names.spelled_path(state, "actionStates[0].resultDescription"),
+        "actionStates[0].actionResult"
+    );
+    assert_eq!(names.spelled_path(order, "/edges/0/maxSpeed"), "/edges/0/maximumSpeed");
+    assert_eq!(names.spelled_path(order, "/edges/-"), "/edges/-");
+    assert_eq!(
+        names.spelled_names(state, &["batteryState", "reach"]),
+        Some(vec!["powerSupply", "range"])
+    );
+    assert_eq!(names.spelled_names(state, &["zoneSetId"]), None);
+    assert_eq!(names.spelled_names(state, &["nobody"]), Some(vec!["nobody"]));
+}
+
+#[test]
+fn elements_stand_where_a_version_without_their_list_has_them() {
+    let names = names(r#"state.instantActionStates = { among = "actionStates" }"#);
+    assert!(names.lacks(StateView::instant_action_states) && names.differs());
+    assert_eq!(
+        names.spelled_path(Topic::State.object(), "instantActionStates[0].actionId"),
+        "actionStates[0].actionId"
+    );
+    assert_eq!(names.id(), Names::default().id(), "views read the same by it");
+    assert!(!Names::default().differs());
+}

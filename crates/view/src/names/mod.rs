@@ -1,6 +1,8 @@
 //! What members are called, which depends on the version of the protocol.
 
+mod details;
 mod object;
+mod spelling;
 mod table;
 
 use std::collections::BTreeMap;
@@ -11,6 +13,8 @@ use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
 use crate::print;
+use details::Details;
+pub use details::Spelling;
 pub use object::Object;
 pub(crate) use object::{Entry, Shape};
 pub(crate) use table::{Found, Table};
@@ -103,12 +107,27 @@ const fn same(one: &str, other: &str) -> bool {
 /// # Ok::<(), toml::de::Error>(())
 /// ```
 ///
+/// Where more than the name is different, a table says it: `name`; `among`, the member of the same object where the elements of a
+/// list stand that a version has no list of its own for; `words`, what the version writes for words of 2.x; `ellipse`, whether a
+/// radius of 2.x is written as one.
+///
 /// A member that was split is two fields, of which a version has one or both. What a version lacks is not read.
 #[derive(Clone, Debug)]
 pub struct Names {
     /// By object.
     tables: Arc<[Table]>,
     id: u64,
+    /// Whether a message of this version is written as one of 2.x.
+    plain: bool,
+    /// Whether what a version has no list of its own for stands among other things.
+    places: bool,
+}
+
+/// Two versions call everything the same.
+impl PartialEq for Names {
+    fn eq(&self, other: &Self) -> bool {
+        self.id == other.id && self.plain == other.plain && self.places == other.places
+    }
 }
 
 /// Why a table of names cannot be used.
@@ -168,9 +187,12 @@ impl Names {
     fn of(tables: Vec<Table>) -> Self {
         let names = Field::all().map(|field| tables[field.object as usize].name(field.index).unwrap_or_default());
         let id = print::of_bytes(names.collect::<Vec<_>>().join("\n").as_bytes());
+        let plain = Field::all().all(|field| tables[field.object as usize].is_plain(field.index, field.usual_name()));
         Self {
+            places: tables.iter().any(Table::has_places),
             tables: tables.into(),
             id,
+            plain,
         }
     }
 
@@ -185,25 +207,37 @@ impl Names {
                 .iter()
                 .map(|entry| (!entry.later).then_some(entry.wire))
                 .collect();
+            let mut further = Vec::new();
             for (member, change) in changes {
                 let at = shape.members.iter().position(|entry| entry.wire == member);
                 let at = at.ok_or_else(|| NamesError::NoMember {
                     object: object.clone(),
                     member: member.clone(),
                 })?;
+                let no_name = || NamesError::NoName {
+                    object: object.clone(),
+                    member: member.clone(),
+                    name: change.to_string(),
+                };
                 members[at] = match change {
                     Value::Bool(has) => has.then_some(shape.members[at].wire),
                     Value::String(name) if is_name(name) => Some(name),
-                    other => {
-                        return Err(NamesError::NoName {
-                            object: object.clone(),
-                            member: member.clone(),
-                            name: other.to_string(),
-                        });
+                    Value::Object(_) => {
+                        let told = Details::deserialize(change.clone()).map_err(|_| no_name())?;
+                        further.push((at, told));
+                        let own = told_name(change);
+                        if own.is_some_and(|name| !is_name(name)) {
+                            return Err(no_name());
+                        }
+                        own.or(members[at])
                     }
+                    _ => return Err(no_name()),
                 };
             }
-            let table = Table::new(&members, shape);
+            let mut table = Table::new(&members, shape);
+            for (at, told) in further {
+                table.tell(at, told);
+            }
             if let Some(name) = table.doubled() {
                 return Err(NamesError::Twice {
                     object: object.clone(),
@@ -254,6 +288,11 @@ impl Names {
     pub(crate) fn table(&self, object: Object) -> &Table {
         &self.tables[object as usize]
     }
+}
+
+/// The name that a table says beside other things.
+fn told_name(change: &Value) -> Option<&str> {
+    change.get("name")?.as_str()
 }
 
 /// Whether it is a name, or two with a slash between them.

@@ -21,6 +21,8 @@ pub struct Entry {
     pub(crate) later: bool,
     /// Whether it does not count for the essence of the object.
     pub(crate) apart: bool,
+    /// The kind of object that it holds, or that its elements are.
+    pub(crate) holds: Option<Object>,
 }
 
 macro_rules! objects {

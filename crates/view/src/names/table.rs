@@ -1,5 +1,6 @@
 //! From the name of a member to its place in a view, without hashing all of the name.
 
+use super::details::Details;
 use super::object::{Entry, Shape};
 use crate::print;
 
@@ -23,6 +24,8 @@ struct Naming {
     usual: u64,
     /// Whether it does not count for the essence of the object.
     apart: bool,
+    /// What else is different.
+    details: Option<Box<Details>>,
 }
 
 /// A name that occurs in an object.
@@ -87,12 +90,36 @@ impl Table {
             name: name.map(Box::from),
             usual: print::of_bytes(entry.wire.as_bytes()),
             apart: entry.apart,
+            details: None,
         };
         Self {
             fields: names.iter().copied().zip(shape.members).map(naming).collect(),
             keys: keys.into(),
             places,
         }
+    }
+
+    /// What else is different of a field.
+    pub(super) fn tell(&mut self, field: usize, details: Details) {
+        if let Some(naming) = self.fields.get_mut(field) {
+            naming.details = Some(Box::new(details));
+        }
+    }
+
+    /// What else is different of a field, if anything is.
+    pub(super) fn details(&self, field: u8) -> Option<&Details> {
+        self.fields.get(usize::from(field))?.details.as_deref()
+    }
+
+    /// Whether a field is written as in 2.x, where it is written at all.
+    pub(super) fn is_plain(&self, field: u8, usual: &str) -> bool {
+        self.details(field).is_none_or(Details::is_place) && self.name(field).is_none_or(|name| name == usual)
+    }
+
+    /// Whether what has no list of its own stands among other things.
+    pub(super) fn has_places(&self) -> bool {
+        let mut details = self.fields.iter().filter_map(|naming| naming.details.as_deref());
+        details.any(Details::is_place)
     }
 
     pub(super) fn name(&self, field: u8) -> Option<&str> {

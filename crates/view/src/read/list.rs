@@ -8,14 +8,19 @@ use super::object::{View, Whole};
 use super::slot::{Readable, Slot};
 use super::walk::Reader;
 use crate::print::Sequence;
-use crate::{ELEMENTS, List, Member, Number, Print, Text};
+use crate::{ELEMENTS, List, Member, Number, Object, Print, Text};
 
 /// What a list can be of.
 pub(crate) trait Element: Default {
+    /// The kind of object that it is.
+    const HOLDS: Option<Object> = None;
+
     fn fill<'de, D: Deserializer<'de>>(&mut self, value: D, reader: &Reader<'_>) -> Result<Print, D::Error>;
 }
 
 impl<V: View> Element for V {
+    const HOLDS: Option<Object> = Some(V::OBJECT);
+
     fn fill<'de, D: Deserializer<'de>>(&mut self, value: D, reader: &Reader<'_>) -> Result<Print, D::Error> {
         value.deserialize_any(Whole { view: self, reader })
     }
@@ -47,6 +52,8 @@ impl<'de, T: Element> DeserializeSeed<'de> for Fill<'_, '_, T> {
 }
 
 impl<T: Element> Readable for List<T> {
+    const HOLDS: Option<Object> = T::HOLDS;
+
     fn read_list<'de, A: SeqAccess<'de>>(
         slot: &mut Member<Self>,
         mut list: A,

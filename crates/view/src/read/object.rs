@@ -121,6 +121,8 @@ pub(crate) fn boxed<'de, V: View, A: MapAccess<'de>>(
 }
 
 impl Readable for Deviation {
+    const HOLDS: Option<Object> = Some(Object::Ellipse);
+
     fn of_number(radius: Number) -> Option<Self> {
         Some(Self::Radius(radius))
     }

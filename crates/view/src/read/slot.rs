@@ -7,10 +7,13 @@ use serde::de::{DeserializeSeed, Error, MapAccess, SeqAccess, Visitor};
 
 use super::free;
 use super::walk::{Reader, numbers};
-use crate::{Json, Member, Number, Print, Text, print};
+use crate::{Json, Member, Number, Object, Print, Text, print};
 
 /// A type that a member can have.
 pub(crate) trait Readable: Sized {
+    /// The kind of object that it is, or that its elements are.
+    const HOLDS: Option<Object> = None;
+
     fn of_flag(_: bool) -> Option<Self> {
         None
     }
