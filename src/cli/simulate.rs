@@ -27,7 +27,11 @@ pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
         Simulated::Site(recording) => return site(recording),
     };
     let packs = Packs::load(&crate::assets::embedded()).map_err(|error| Problem::Environment(error.to_string()))?;
-    let pack = super::pack_for_devices(&packs, connection.protocol.as_deref())?;
+    let role = match &arguments.what {
+        Simulated::MasterControl(_) => Role::MasterControl,
+        Simulated::Agv(_) | Simulated::Site(_) => Role::Agv,
+    };
+    let pack = super::pack_for_devices(&packs, connection.protocol.as_deref(), role)?;
     let endpoint = super::discover::endpoint(&connection.access)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
@@ -253,7 +257,7 @@ fn configured(
     let mut fleet = Fleet::default();
     for vehicle in &device.vehicle {
         let own = match &vehicle.protocol {
-            Some(version) => super::pack_for_devices(packs, Some(version))?,
+            Some(version) => super::pack_for_devices(packs, Some(version), Role::MasterControl)?,
             None => Arc::clone(pack),
         };
         fleet.join(&like(&own), &vehicle.manufacturer, &vehicle.serial, &own);
