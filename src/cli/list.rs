@@ -48,7 +48,9 @@ pub fn list(arguments: &List) -> Result<Exit, Problem> {
                 .iter()
                 .map(|role| Ok((*role, filtered(arguments, &library, &pack, *role)?)));
             let all: Vec<_> = all.collect::<Result<_, Diagnostic>>()?;
-            if let Err(none) = library.rules.packs.for_devices(&pack.id) {
+            if !roles.iter().any(|role| pack.judges(*role))
+                && let Err(none) = library.rules.packs.for_devices(&pack.id, roles[0])
+            {
                 return Err(Problem::NothingToDo(none.to_string()));
             }
             if all.iter().all(|(_, tests)| tests.is_empty()) {

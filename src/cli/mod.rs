@@ -63,7 +63,7 @@ use list::print;
 use problem::Problem;
 use tck_base::diagnostic::Diagnostic;
 use tck_judge::Library;
-use tck_pack::{NoPack, Pack, Packs};
+use tck_pack::{NoPack, Pack, Packs, Role};
 use tck_report::text::Color;
 
 /// The program.
@@ -166,10 +166,10 @@ fn pack(library: &Library, protocol: Option<&str>) -> Result<Arc<Pack>, Problem>
     Ok(Arc::clone(found.map_err(|none| missing(&none))?))
 }
 
-/// The pack by which devices of a version are judged and simulated, where suites and catalogue are not needed, which take a
+/// The pack by which devices of one side of a version are judged and simulated, where suites and catalogue are not needed, which take a
 /// while to be read; the newest one unless said.
-fn pack_for_devices(packs: &Packs, protocol: Option<&str>) -> Result<Arc<Pack>, Problem> {
-    let found = protocol.map_or_else(|| Ok(packs.latest()), |wanted| packs.for_devices(wanted));
+fn pack_for_devices(packs: &Packs, protocol: Option<&str>, role: Role) -> Result<Arc<Pack>, Problem> {
+    let found = protocol.map_or_else(|| Ok(packs.latest()), |wanted| packs.for_devices(wanted, role));
     Ok(Arc::clone(found.map_err(|none| missing(&none))?))
 }
 

@@ -44,10 +44,27 @@ pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
     if with_faults.is_empty() {
         check_faults(roles.first().copied().unwrap_or(Role::Agv), &arguments.fault)?;
     }
-    let packs = match arguments.protocol.as_deref() {
-        Some(wanted) => vec![super::pack_for_devices(&library.rules.packs, Some(wanted))?],
-        None => library.rules.packs.of_devices().cloned().collect(),
+    let known = &library.rules.packs;
+    // Of a version that knows one side only the other one is left out, unless it is the one that is asked for.
+    let judged = |role: Role| match arguments.protocol.as_deref() {
+        Some(wanted) => super::pack_for_devices(known, Some(wanted), role).map(|pack| vec![pack]),
+        None => Ok(known.of_devices().cloned().collect()),
     };
+    let mut sides_of = Vec::new();
+    for role in &with_faults {
+        match judged(*role) {
+            Ok(packs) => sides_of.extend(packs.into_iter().map(|pack| (*role, pack))),
+            Err(problem)
+                if with_faults.len() == 1 || known.find(arguments.protocol.as_deref().unwrap_or_default()).is_err() =>
+            {
+                return Err(problem);
+            }
+            Err(_) => {}
+        }
+    }
+    if let (true, Some(role)) = (sides_of.is_empty(), with_faults.first()) {
+        judged(*role)?;
+    }
     let named = !arguments.fault.is_empty();
     let depth = match (named, &part) {
         (true, _) => Depth::Everything,
@@ -59,10 +76,8 @@ pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
     let whole = arguments.tests.is_empty() && !named;
     let mut refused = None;
     let mut jobs = Vec::new();
-    for (role, pack) in with_faults
-        .iter()
-        .flat_map(|role| packs.iter().map(move |pack| (*role, pack)))
-    {
+    for (role, pack) in &sides_of {
+        let role = *role;
         let is_asked = |fault: &&Fault| !named || arguments.fault.iter().any(|name| name == fault.name);
         let faults: Vec<Fault> = BuiltIn::faults(role).iter().filter(is_asked).copied().collect();
         let all = library.tests(role, &pack.id);

@@ -33,7 +33,11 @@ pub fn simulate(arguments: &Simulate) -> Result<Exit, Problem> {
     let spoken = like.as_ref().and_then(|like| like.protocol.as_deref());
     let packs =
         Packs::load(&crate::assets::embedded_versions()).map_err(|error| Problem::Environment(error.to_string()))?;
-    let pack = super::pack_for_devices(&packs, connection.protocol.as_deref().or(spoken))?;
+    let role = match &arguments.what {
+        Simulated::MasterControl(_) => Role::MasterControl,
+        Simulated::Agv(_) | Simulated::Site(_) => Role::Agv,
+    };
+    let pack = super::pack_for_devices(&packs, connection.protocol.as_deref().or(spoken), role)?;
     let endpoint = super::discover::endpoint(&connection.access)?;
     let mut builder = match &arguments.what {
         Simulated::MasterControl(_) => tokio::runtime::Builder::new_multi_thread(),
@@ -298,7 +302,7 @@ fn configured(
     let mut fleet = Fleet::default();
     for vehicle in &device.vehicle {
         let own = match &vehicle.protocol {
-            Some(version) => super::pack_for_devices(packs, Some(version))?,
+            Some(version) => super::pack_for_devices(packs, Some(version), Role::MasterControl)?,
             None => Arc::clone(pack),
         };
         fleet.join(&like(&own), &vehicle.manufacturer, &vehicle.serial, &own);

@@ -73,7 +73,7 @@ impl Course {
 
     /// Whether an action of the order is under way.
     fn works(&self, state: &StateView) -> bool {
-        let mut all = state.action_states.iter().take(MANY);
+        let mut all = state.all_action_states().take(MANY);
         all.any(|action| action.action_status.is("RUNNING") && !self.sent.contains_key(action.action_id.or_empty()))
     }
 }
@@ -104,7 +104,7 @@ impl Running for Course {
         let now = record.at().moment;
         let patience = context.time.notice;
         let mut judged = false;
-        for action in state.action_states.iter().take(MANY) {
+        for action in state.all_action_states().take(MANY) {
             let id = action.action_id.or_empty();
             let status = action.action_status.or_empty();
             let Some((true, seq)) = self.sent.get(id).copied() else {
@@ -141,7 +141,7 @@ impl Running for Course {
             }
             let since = *begun.waits.get_or_insert(now);
             // Who has done what was asked for later has read the cancellation long ago.
-            let later = state.action_states.iter().take(MANY).any(|other| {
+            let later = state.all_action_states().take(MANY).any(|other| {
                 let asked = self.sent.get(other.action_id.or_empty());
                 other.action_status.is("FINISHED") && asked.is_some_and(|(_, at)| *at > seq)
             });

@@ -46,8 +46,7 @@ impl Running for Blame {
             return false;
         };
         let statuses: BTreeMap<&str, &str> = state
-            .action_states
-            .iter()
+            .all_action_states()
             .take(MANY)
             .map(|action| (action.action_id.or_empty(), action.action_status.or_empty()))
             .collect();

@@ -288,12 +288,11 @@ impl Answered {
     ) {
         let (slow, react) = limits;
         let busy = state
-            .action_states
-            .iter()
+            .all_action_states()
             .take(ACTIONS)
             .any(|action| active(action.action_status.or_empty()))
             || !state.driving.is(false);
-        for action in state.action_states.iter().take(ACTIONS) {
+        for action in state.all_action_states().take(ACTIONS) {
             let Some(asked) = self.asked.get_mut(action.action_id.or_empty()) else {
                 continue;
             };

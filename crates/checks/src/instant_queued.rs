@@ -99,8 +99,7 @@ impl Running for NotQueued {
         };
         let now = record.at().moment;
         let statuses: BTreeMap<&str, &str> = state
-            .action_states
-            .iter()
+            .all_action_states()
             .take(ACTIONS)
             .map(|action| (action.action_id.or_empty(), action.action_status.or_empty()))
             .collect();

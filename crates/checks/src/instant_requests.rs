@@ -78,7 +78,7 @@ impl Requests {
         for (since, came) in self.states.values_mut() {
             came.get_or_insert((now.since(*since), record.seq()));
         }
-        for action in state.action_states.iter().take(REQUESTS * 4) {
+        for action in state.all_action_states().take(REQUESTS * 4) {
             let (id, status) = (action.action_id.or_empty(), action.action_status.or_empty());
             if !matches!(status, "FINISHED" | "FAILED") {
                 continue;

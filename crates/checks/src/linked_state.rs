@@ -162,7 +162,7 @@ impl Linked {
         let placed = |action: &&ActionState| self.placed.contains(action.action_id.or_empty());
         let open = |action: &&ActionState| !action.is_over();
         let waits = |action: &&ActionState| action.action_status.is("WAITING");
-        let left = state.action_states.iter().take(ACTIONS).filter(placed).filter(open);
+        let left = state.all_action_states().take(ACTIONS).filter(placed).filter(open);
         // One that runs rather than one that waits.
         let Some(action) = left.min_by_key(waits) else {
             return Vec::new();
@@ -292,8 +292,7 @@ impl Running for Linked {
         let left_alone = |topic| self.touched.get(&topic).is_none_or(|at| now.since(*at) > INFLUENCE);
         let still = state.driving.is(false);
         let listed: Vec<(&str, &str)> = state
-            .action_states
-            .iter()
+            .all_action_states()
             .take(ACTIONS)
             .map(|action| (action.action_id.or_empty(), action.action_status.or_empty()))
             .filter(|(id, _)| self.known.contains_key(*id))

@@ -16,7 +16,7 @@ use tck_base::device::Publication;
 use tck_base::pattern::Bindings;
 use tck_judge::Ground;
 use tck_suite::model::{Patch, Raw, Send, SendAction};
-use tck_view::{FactsheetView, OfferedAction, OrderView};
+use tck_view::{FactsheetView, OfferedAction, OrderView, Topic};
 
 /// A finished message and the actionIds in it, by the names given with `as`.
 #[derive(Debug)]
@@ -141,6 +141,10 @@ impl Composer {
         if let Value::Object(members) = members {
             message.extend(members);
         }
+        ground
+            .pack
+            .names()
+            .spell_members(Topic::of_name(topic).object(), &mut message);
         Ok(Publication {
             topic: full,
             payload: self.manners.text(&Value::Object(message), self.longest()).into(),
@@ -160,7 +164,11 @@ impl Composer {
         let mut message = self.header(&send.topic, ground, now);
         let payload = send.payload.as_ref().map(|term| term.bind(bindings)).transpose()?;
         if !send.actions.is_empty() {
-            let list = self.actions(&send.actions, Some(send), bindings, actions)?;
+            let kind = ActionKind::Instant {
+                broken: send.patch.is_some(),
+                blocks: !ground.pack.has("instantActionsNeverBlock"),
+            };
+            let list = self.actions(&send.actions, kind, bindings, actions)?;
             message.insert("actions".to_owned(), Value::Array(list));
         }
         if let Some(route) = &send.route {
@@ -174,7 +182,8 @@ impl Composer {
             message.insert("orderUpdateId".to_owned(), json!(0));
             let mut placed = BTreeMap::new();
             for (at, (place, list)) in route.actions.iter().enumerate() {
-                placed.insert(at, (place.clone(), self.actions(list, None, bindings, actions)?));
+                let list = self.actions(list, ActionKind::OfOrder, bindings, actions)?;
+                placed.insert(at, (place.clone(), list));
             }
             let builder = RouteBuilder {
                 course: bindings.get("course"),
@@ -194,14 +203,37 @@ impl Composer {
         if let Some(payload) = payload {
             json_patch::merge(&mut message, &payload);
         }
+        let (names, object) = (ground.pack.names(), Topic::of_name(&send.topic).object());
+        names.spell(object, &mut message);
         match &send.patch {
             None => {}
-            Some(Patch::Merge(term)) => json_patch::merge(&mut message, &term.bind(bindings)?),
+            Some(Patch::Merge(term)) => {
+                let mut patch = term.bind(bindings)?;
+                names.spell(object, &mut patch);
+                json_patch::merge(&mut message, &patch);
+            }
             Some(Patch::Operations(term)) => {
                 let Value::Array(operations) = term.bind(bindings)? else {
                     return Err(ComposeError::Patch("it is no list of operations".to_owned()));
                 };
-                for operation in operations {
+                for mut operation in operations {
+                    let at = operation
+                        .get("path")
+                        .and_then(Value::as_str)
+                        .unwrap_or_default()
+                        .to_owned();
+                    // What keeps an order in one piece need not be done where there is no such member.
+                    if names.has_lost(object, &at) {
+                        continue;
+                    }
+                    if let Some(value) = operation.get_mut("value") {
+                        names.spell_at(object, &at, value);
+                    }
+                    for place in ["path", "from"] {
+                        if let Some(Value::String(path)) = operation.get_mut(place) {
+                            *path = names.spelled_path(object, path);
+                        }
+                    }
                     operate(&mut message, operation)?;
                 }
             }
@@ -213,13 +245,13 @@ impl Composer {
     fn actions(
         &mut self,
         list: &[SendAction],
-        instant: Option<&Send>,
+        kind: ActionKind,
         bindings: &Bindings,
         named: &mut Vec<(String, String)>,
     ) -> Result<Vec<Value>, ComposeError> {
         // What is broken on purpose has to be there first.
-        let whole =
-            instant.is_none_or(|send| send.patch.is_some()) || !self.manners.has(Manner::EmptyParametersLeftOut);
+        let whole = !matches!(kind, ActionKind::Instant { broken: false, .. })
+            || !self.manners.has(Manner::EmptyParametersLeftOut);
         let mut all = Vec::new();
         for action in list {
             let known = action
@@ -244,10 +276,14 @@ impl Composer {
             let action_type = action.action.bind(bindings)?;
             let blocking = action.blocking.as_ref().map(|term| term.bind(bindings)).transpose()?;
             let blocking = match blocking {
-                Some(said) if instant.is_none() => said,
+                Some(said) if kind == ActionKind::OfOrder => said,
+                _ if matches!(kind, ActionKind::Instant { blocks: false, .. }) => json!("NONE"),
                 // How an instant action blocks is nothing a test is about.
                 said => {
-                    let usual = instant.map_or("HARD", |_| self.manners.blocking());
+                    let usual = match kind {
+                        ActionKind::OfOrder => "HARD",
+                        ActionKind::Instant { .. } => self.manners.blocking(),
+                    };
                     let usual = said.unwrap_or_else(|| json!(usual));
                     usual_blocking(&action_type, usual, self.factsheet.as_deref())
                 }
@@ -268,7 +304,7 @@ impl Composer {
         let id = self.header_ids.entry(topic.to_owned()).or_default();
         let header = json!({
             "headerId": *id,
-            "timestamp": timestamp(now),
+            "timestamp": timestamp(now, ground.pack.timestamp_digits()),
             "version": ground.pack.version.to_string(),
             "manufacturer": ground.identity.0,
             "serialNumber": ground.identity.1,
@@ -279,6 +315,20 @@ impl Composer {
             _ => Map::new(),
         }
     }
+}
+
+/// Where actions stand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum ActionKind {
+    /// In an order.
+    OfOrder,
+    /// In a message with instant actions.
+    Instant {
+        /// Whether the message is broken on purpose afterwards.
+        broken: bool,
+        /// Whether they may block at all.
+        blocks: bool,
+    },
 }
 
 /// One operation of JSON Patch, or `as-text`: the value that stands there is put in quotes.
@@ -300,9 +350,9 @@ fn operate(message: &mut Value, operation: Value) -> Result<(), ComposeError> {
     json_patch::patch(message, &operations).map_err(|error| ComposeError::Patch(error.to_string()))
 }
 
-/// ISO 8601 in UTC with two fraction digits (HDR-03).
-fn timestamp(now: Stamp) -> String {
-    format!("{:.2}", now.utc)
+/// ISO 8601 in UTC with so many fraction digits (HDR-03).
+fn timestamp(now: Stamp, digits: usize) -> String {
+    format!("{:.digits$}", now.utc)
 }
 
 /// How an action blocks where a test does not care: the usual way, or the first type its factsheet lists when the usual
@@ -338,12 +388,13 @@ mod tests {
     }
 
     #[test]
-    fn the_timestamp_has_two_fraction_digits_and_a_z() {
+    fn the_timestamp_has_the_fraction_digits_of_its_version_and_a_z() {
         let utc = "2026-11-21T09:16:24.129Z".parse().expect("timestamp");
         let stamp = Stamp {
             moment: Moment::START,
             utc,
         };
-        assert_eq!(timestamp(stamp), "2026-11-21T09:16:24.12Z");
+        assert_eq!(timestamp(stamp, 2), "2026-11-21T09:16:24.12Z");
+        assert_eq!(timestamp(stamp, 3), "2026-11-21T09:16:24.129Z");
     }
 }

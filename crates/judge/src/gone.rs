@@ -175,16 +175,10 @@ const SPEAKS: [&str; 3] = ["state", "visualization", "factsheet"];
 
 /// What a connection message says, if it is that nobody is there.
 pub(super) fn ends(entry: &Entry, names: &Names) -> Option<String> {
-    let state = entry
-        .view(Topic::Connection, names)?
-        .connection()?
-        .connection_state
-        .text()?;
-    ENDS.contains(&state).then(|| state.to_owned())
+    let message = entry.view(Topic::Connection, names)?.connection()?;
+    let said = message.connection_state.text()?;
+    message.is_gone().then(|| said.to_owned())
 }
-
-/// The words of all versions for it.
-const ENDS: [&str; 2] = ["CONNECTIONBROKEN", "OFFLINE"];
 
 #[cfg(test)]
 mod tests {

@@ -12,7 +12,7 @@ use super::decide::mood;
 use super::hidden::Hidden;
 use super::run_contexts::Ground;
 use super::step::shown_path;
-use tck_base::pattern::{Bindings, Bound, Unbound};
+use tck_base::pattern::{Bindings, Bound, Pattern, Unbound};
 use tck_base::time::TimeLimits;
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_check::{CheckContext, CheckFinding, Running, Shared, find};
@@ -20,6 +20,7 @@ use tck_journal::Entry;
 use tck_journal::event::Event;
 use tck_result::{MonitorFinding, MonitorResult};
 use tck_suite::model::{Monitor, Need, Recordings, Rule};
+use tck_suite::spelled;
 use tck_view::Topic;
 use tck_world::{End, Listen, Listens, Observation, World};
 
@@ -109,7 +110,9 @@ impl MonitorJudge {
             Some(Awaited {
                 requirement: about.requirement.requirement.as_str().to_owned(),
                 topic: about.topic.clone(),
-                pattern: about.pattern.bind(bindings).ok()?,
+                pattern: spelled(&about.pattern, ground.pack.names(), &about.topic)
+                    .bind(bindings)
+                    .ok()?,
             })
         });
         Some(Self {
@@ -135,17 +138,18 @@ impl MonitorJudge {
     }
 
     fn watch(rule: &Rule, ground: &Ground, bindings: &Bindings, known: &mut Knowledge) -> Result<Watching, Unbound> {
+        let bind = |pattern: &Pattern, topic: &str| spelled(pattern, ground.pack.names(), topic).bind(bindings);
         Ok(match rule {
             Rule::Always { topic, when, pattern } => Watching::Pattern {
                 topic: topic.clone(),
-                when: when.as_ref().map(|when| when.bind(bindings)).transpose()?,
-                pattern: pattern.bind(bindings)?,
+                when: when.as_ref().map(|when| bind(when, topic)).transpose()?,
+                pattern: bind(pattern, topic)?,
                 forbidden: false,
             },
             Rule::Never { topic, pattern } => Watching::Pattern {
                 topic: topic.clone(),
                 when: None,
-                pattern: pattern.bind(bindings)?,
+                pattern: bind(pattern, topic)?,
                 forbidden: true,
             },
             Rule::Check(check) => {

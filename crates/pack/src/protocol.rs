@@ -62,8 +62,10 @@ pub struct TopicRule {
 enum Judged {
     /// Messages, one by one.
     Messages,
-    /// Devices, by tests and beside reference devices.
+    /// Devices of both sides, by tests and beside reference devices.
     Devices,
+    /// Vehicles.
+    Agv,
 }
 
 /// `protocol.toml`.
@@ -201,10 +203,17 @@ impl Pack {
         })
     }
 
-    /// Whether there are tests and reference devices of this version, so that devices can be judged by it, and not only messages.
+    /// Whether there are tests and reference devices of both sides of this version, so that devices can be judged by it, and not only
+    /// messages.
     #[must_use]
     pub fn judges_devices(&self) -> bool {
         self.judges.contains(&Judged::Devices)
+    }
+
+    /// Whether devices of this side can be judged by it.
+    #[must_use]
+    pub fn judges(&self, role: Role) -> bool {
+        self.judges_devices() || role == Role::Agv && self.judges.contains(&Judged::Agv)
     }
 
     /// The topics of the protocol.
@@ -393,12 +402,17 @@ impl Packs {
         &self.all
     }
 
-    /// Those that devices can be judged by, oldest first.
+    /// Those that devices of one side can be judged by, oldest first.
+    pub fn of_role(&self, role: Role) -> impl Iterator<Item = &Arc<Pack>> {
+        self.all.iter().filter(move |pack| pack.judges(role))
+    }
+
+    /// Those that devices of both sides can be judged by, oldest first.
     pub fn of_devices(&self) -> impl Iterator<Item = &Arc<Pack>> {
         self.all.iter().filter(|pack| pack.judges_devices())
     }
 
-    /// The newest that devices can be judged by.
+    /// The newest that devices of both sides can be judged by.
     pub fn latest(&self) -> &Arc<Pack> {
         &self.latest
     }
@@ -412,18 +426,27 @@ impl Packs {
             .find(|pack| (pack.version.major, pack.version.minor) == (version.major, version.minor))
     }
 
-    /// The pack by which the devices of a version are judged.
+    /// The pack by which the devices of one side are judged that speak a version.
     ///
     /// # Errors
-    /// There is no such version, or only its messages can be judged.
-    pub fn for_devices(&self, version: &str) -> Result<&Arc<Pack>, NoPack> {
+    /// There is no such version, or devices of this side cannot be judged by it.
+    pub fn for_devices(&self, version: &str, role: Role) -> Result<&Arc<Pack>, NoPack> {
         let pack = self.find(version)?;
-        pack.judges_devices()
-            .then_some(pack)
-            .ok_or_else(|| NoPack::MessagesOnly {
-                version: pack.version,
-                others: listed(self.of_devices()),
+        let (version, others) = (pack.version, || listed(self.of_role(role)));
+        if pack.judges(role) {
+            Ok(pack)
+        } else if [Role::Agv, Role::MasterControl].iter().any(|other| pack.judges(*other)) {
+            Err(NoPack::OtherSideOnly {
+                version,
+                role,
+                others: others(),
             })
+        } else {
+            Err(NoPack::MessagesOnly {
+                version,
+                others: others(),
+            })
+        }
     }
 
     /// The pack of a version, whatever its patch level.
@@ -501,6 +524,18 @@ pub enum NoPack {
         /// Those that devices can be judged by, in words.
         others: String,
     },
+    /// There are tests and reference devices of the other side only.
+    #[error(
+        "of protocol version {version} no {role} can be judged: there are no tests and no reference devices for it yet"
+    )]
+    OtherSideOnly {
+        /// The version.
+        version: Version,
+        /// The side that cannot be judged.
+        role: Role,
+        /// Those that such devices can be judged by, in words.
+        others: String,
+    },
 }
 
 impl NoPack {
@@ -510,6 +545,7 @@ impl NoPack {
         match self {
             Self::Unknown { .. } => "unknown-version",
             Self::MessagesOnly { .. } => "messages-only",
+            Self::OtherSideOnly { .. } => "other-side-only",
         }
     }
 
@@ -518,7 +554,7 @@ impl NoPack {
     pub fn hint(&self) -> String {
         match self {
             Self::Unknown { known, .. } => format!("known versions: {known}"),
-            Self::MessagesOnly { others, .. } => {
+            Self::MessagesOnly { others, .. } | Self::OtherSideOnly { others, .. } => {
                 format!("`validate`, `audit` and `watch` judge its messages; devices are judged by {others}")
             }
         }

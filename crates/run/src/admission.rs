@@ -231,8 +231,14 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
     /// Sends one instant action outside any test, and gives its id.
     pub(super) async fn instant_action(&mut self, action_type: &str, parameters: Value) -> Result<String, EngineError> {
         let id = self.engine.composer.action_id();
+        let pack = &self.engine.recorder.judge().ground().pack;
+        let blocking = if pack.has("instantActionsNeverBlock") {
+            "NONE"
+        } else {
+            "HARD"
+        };
         let members = json!({ "actions": [{
-            "actionType": action_type, "actionId": id, "blockingType": "HARD", "actionParameters": parameters,
+            "actionType": action_type, "actionId": id, "blockingType": blocking, "actionParameters": parameters,
         }] });
         let now = self.engine.link.now();
         let message = self

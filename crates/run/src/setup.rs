@@ -251,10 +251,13 @@ pub fn pack_of(library: &Library, effective: &Effective) -> Result<Arc<Pack>, Di
     let Some(wanted) = &effective.profile.device.protocol else {
         return Ok(Arc::clone(packs.latest()));
     };
-    packs.for_devices(wanted).cloned().map_err(|none| {
-        let diagnostic = effective.complain("device.protocol", none.code(), none.to_string(), "this version");
-        diagnostic.hint(none.hint())
-    })
+    packs
+        .for_devices(wanted, effective.profile.device.role)
+        .cloned()
+        .map_err(|none| {
+            let diagnostic = effective.complain("device.protocol", none.code(), none.to_string(), "this version");
+            diagnostic.hint(none.hint())
+        })
 }
 
 /// The names of the mock AGVs that a master control gets by a profile, where at least so many are asked for; in their order.
@@ -314,7 +317,7 @@ fn join_others(
     for group in &profile.vehicles.others {
         let own: &Pack = match &group.protocol {
             None => pack,
-            Some(version) => packs.for_devices(version).map_err(|none| {
+            Some(version) => packs.for_devices(version, Role::MasterControl).map_err(|none| {
                 let span = group.span.clone();
                 let diagnostic = Diagnostic::new(none.code(), span, none.to_string(), "of these vehicles");
                 vec![diagnostic.hint(none.hint())]

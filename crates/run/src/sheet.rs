@@ -4,13 +4,14 @@ use std::ops::Deref;
 use std::sync::Arc;
 
 use serde_json::Value;
-use tck_view::{FactsheetView, MessageView, Names, Topic};
+use tck_view::{FactsheetView, MessageView, Names, Object, Topic};
 
 /// A factsheet. Its limits are kept as they were published, too: tests name any of them.
 #[derive(Clone, Debug, Default)]
 pub struct Sheet {
     view: Arc<FactsheetView>,
     limits: Option<Value>,
+    names: Names,
 }
 
 impl Sheet {
@@ -21,6 +22,7 @@ impl Sheet {
         Self {
             view: view.factsheet().map(Arc::clone).unwrap_or_default(),
             limits: names.raw(message, &[FactsheetView::protocol_limits]).cloned(),
+            names: names.clone(),
         }
     }
 
@@ -29,7 +31,12 @@ impl Sheet {
     #[must_use]
     pub fn has_limit(&self, path: &str) -> Option<bool> {
         let (group, member) = path.split_once('.').unwrap_or((path, ""));
-        let value = self.limits.as_ref()?.get(group).and_then(|group| group.get(member));
+        let own = self.names.spelled_names(Object::ProtocolLimits, &[group, member]);
+        let own = own.unwrap_or_default().into_iter();
+        let value = own
+            .clone()
+            .next()
+            .and(own.fold(self.limits.as_ref(), |here, name| here?.get(name)));
         Some(value.and_then(Value::as_f64).is_some_and(|limit| limit > 0.0))
     }
 
@@ -37,6 +44,8 @@ impl Sheet {
     #[must_use]
     pub fn has_action(&self, name: &str, scope: Option<&str>) -> Option<bool> {
         let all = self.protocol_features.there()?.actions.there()?;
+        let spelling = self.names.spelling(Object::OfferedAction, "actionType");
+        let name = spelling.map_or(name, |spelling| spelling.word(name));
         Some(all.iter().any(|action| {
             let is_scope = |scope: &str| action.action_scopes.texts().any(|other| other == scope);
             action.action_type.is(name) && scope.is_none_or(is_scope)
@@ -59,17 +68,28 @@ impl Sheet {
     #[must_use]
     pub fn has_optional(&self, path: &str) -> Option<bool> {
         let all = self.protocol_features.there()?.optional_parameters.there()?;
-        Some(all.iter().any(|one| one.parameter.is(path)))
+        let path = self.spelled(path);
+        Some(all.iter().any(|one| one.parameter.is(&path)))
     }
 
     /// Whether the vehicle cannot do without the optional parameter, or without a part of it.
     #[must_use]
     pub fn requires(&self, path: &str) -> bool {
+        let path = self.spelled(path);
         self.optional_parameters().any(|one| {
-            let rest = one.parameter.or_empty().strip_prefix(path);
+            let rest = one.parameter.or_empty().strip_prefix(path.as_str());
             let is_part = rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
             is_part && one.support.is("REQUIRED")
         })
+    }
+
+    /// An optional parameter, which begins with its topic, as the version of the vehicle writes it.
+    fn spelled(&self, path: &str) -> String {
+        let (topic, below) = path.split_once('.').unwrap_or((path, ""));
+        format!(
+            "{topic}.{}",
+            self.names.spelled_path(Topic::of_name(topic).object(), below)
+        )
     }
 
     /// The series it is of.

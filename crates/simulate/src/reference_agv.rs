@@ -9,8 +9,9 @@ use tck_course::{BUILT_IN_MAP, BUILT_IN_UPPER_MAP, Edge, Layout};
 use tck_pack::Participant;
 use tck_pack::{Pack, Role};
 use tck_profile::{Place, SAMPLE_ACTIONS, SampleAction, SampleActions, TimeLimits};
-use tck_reference::agv::{AgvConfig, LayoutNode, OnboardMap};
+use tck_reference::agv::{AgvConfig, ErrorEnd, ErrorNames, ErrorRule, LayoutNode, OnboardMap};
 use tck_reference::deviations::agv::UnknownTolerance;
+use tck_view::Names;
 
 /// The reference AGV and everything a run must know about it.
 #[derive(Clone, Debug)]
@@ -81,6 +82,20 @@ fn sample_actions(layout: &Layout) -> SampleActions {
     SampleActions(all.into_iter().filter_map(sample).collect())
 }
 
+/// What a version says of the errors that it names.
+fn error_rules(pack: &Pack) -> BTreeMap<String, ErrorRule> {
+    let named = pack.vocabulary().get("predefinedError").and_then(Value::as_object);
+    let rule = |(name, said): (&String, &Value)| {
+        let word = |key: &str| said.get(key).and_then(Value::as_str);
+        let rule = ErrorRule {
+            level: word("level")?.to_owned(),
+            until: ErrorEnd::of_word(word("until")?),
+        };
+        Some((name.clone(), rule))
+    };
+    named.into_iter().flatten().filter_map(rule).collect()
+}
+
 /// Kinds of reference AGVs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Vehicle {
@@ -149,6 +164,10 @@ impl ReferenceAgv {
             manufacturer: subject.manufacturer.clone(),
             serial_number: subject.serial_number.clone(),
             version: pack.version.to_string(),
+            names: Names::clone(pack.names()),
+            timestamp_digits: pack.timestamp_digits(),
+            errors: ErrorNames::from_vocabulary(|path| pack.word(path)),
+            error_rules: error_rules(pack),
             topics: subject.topics(pack),
             features: pack
                 .features()

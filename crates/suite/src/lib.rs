@@ -21,6 +21,7 @@ mod read;
 mod recordings;
 mod schema_cases;
 mod source;
+mod spelling;
 mod steps;
 mod stimuli;
 mod terms;
@@ -33,6 +34,7 @@ use std::sync::{Arc, OnceLock};
 
 pub use exceptions::{Exceptions, Unfound, Unproven};
 pub use lint::{PackVocabulary, RequirementFacts, Variable, Vocabulary, harness_topics, variables};
+pub use spelling::spelled;
 
 use model::{Monitor, Test};
 use tck_base::diagnostic::Diagnostic;

@@ -99,7 +99,7 @@ impl Alarms {
 
     /// What its connection topic says; `stored` ones tell of the past.
     pub(crate) fn connection(&mut self, said: &ConnectionView, at: Stamp, stored: bool) -> Option<Alarm> {
-        let broken = said.connection_state.is("CONNECTIONBROKEN");
+        let broken = said.is_broken();
         let is_news = broken && !self.broken && !stored;
         self.broken = broken;
         if said.is_online() {

@@ -131,7 +131,10 @@ pub(crate) fn is_taken_out(state: &StateView) -> bool {
 }
 
 fn is_taken_out_beside(state: &StateView, borne: &[Print]) -> bool {
-    let manual = matches!(state.operating_mode.or_empty(), "MANUAL" | "SERVICE" | "TEACHIN");
+    let manual = matches!(
+        state.operating_mode.or_empty(),
+        "MANUAL" | "SERVICE" | "TEACHIN" | "TEACH_IN" | "STARTUP" | "INTERVENED"
+    );
     let stopped = matches!(state.emergency_stop(), Some("AUTOACK" | "MANUAL" | "REMOTE"));
     let fatal = fatal_errors(state).any(|error| !borne.contains(&error.print));
     manual || stopped || fatal

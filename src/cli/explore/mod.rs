@@ -44,6 +44,15 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
         reference::is_tested(&Asked::of_explore(arguments), &effective, &surroundings)?;
     }
     let pack = tck_run::pack_of(&library, &effective)?;
+    if !pack.judges_devices() {
+        let title = format!(
+            "of protocol version {} there are no stimuli of an exploration yet",
+            pack.version
+        );
+        let known = library.rules.packs.of_devices().map(|known| known.version.to_string());
+        let hint = format!("there are for {}", known.collect::<Vec<_>>().join(", "));
+        return Err(Diagnostic::whole("no-stimuli", title).hint(hint).into());
+    }
     let role = effective.profile.device.role;
     check_faults(role, &arguments.fault)?;
     let grammar = Grammar::load(&library.assets, role)

@@ -125,8 +125,7 @@ impl ActionIds {
     fn learn(&mut self, record: &Observation<'_>) {
         let Some(state) = record.said_state() else { return };
         for action in state
-            .action_states
-            .iter()
+            .all_action_states()
             .take(ELEMENTS)
             .filter(|action| action.is_over())
         {

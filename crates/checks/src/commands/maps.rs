@@ -179,7 +179,7 @@ impl Running for Enabled {
                 self.reported.pop_front();
             }
             self.reported.push_back((record.at().moment, enabled));
-            let all = state.action_states.iter().take(ELEMENTS);
+            let all = state.all_action_states().take(ELEMENTS);
             for action in all.filter(|action| action.action_status.is("FINISHED")) {
                 let map = self.asked.remove(action.action_id.or_empty());
                 self.usable.extend(map.filter(|_| self.usable.len() < KEPT));
@@ -315,7 +315,7 @@ impl Duplicates {
             let mut maps = state.maps.iter().take(KEPT);
             maps.any(|map| map.map_id.or_empty() == pair.0 && map.map_version.or_empty() == pair.1)
         };
-        for action in state.action_states.iter().take(ELEMENTS) {
+        for action in state.all_action_states().take(ELEMENTS) {
             if !action.is_failed() {
                 continue;
             }

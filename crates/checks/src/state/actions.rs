@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_pack::Pack;
-use tck_view::StateView;
+use tck_view::{ActionState, StateView};
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// How many actions are kept in mind; a state that lists more is judged on the first ones.
@@ -97,10 +97,9 @@ impl Graph {
         self.0.get(status).is_some_and(BTreeSet::is_empty)
     }
 
-    /// Id and status of every action state; statuses that do not exist are another check's business.
-    fn statuses<'v>(&self, state: &'v StateView) -> impl Iterator<Item = (&'v str, &'v str)> {
-        let listed = state.action_states.iter().take(ACTIONS);
-        let named = listed.filter_map(|action| {
+    /// Id and status of action states; statuses that do not exist are another check's business.
+    fn statuses<'v>(&self, all: impl Iterator<Item = &'v ActionState>) -> impl Iterator<Item = (&'v str, &'v str)> {
+        let named = all.take(ACTIONS).filter_map(|action| {
             let id = action.action_id.there().filter(|id| !id.is_cut() && id.len() <= 512)?;
             Some((id.as_str(), action.action_status.or_empty()))
         });
@@ -124,7 +123,7 @@ impl Running for Transitions {
         };
         let seq = record.seq();
         let mut now = HashMap::new();
-        for (id, status) in self.graph.statuses(state) {
+        for (id, status) in self.graph.statuses(state.all_action_states()) {
             if now.insert(id.to_owned(), status.to_owned()).is_some() {
                 let text = format!("actionStates lists {} more than once", quote(id));
                 findings.push(broken("STATE-MSG-09", seq, text));
@@ -202,7 +201,7 @@ impl Running for Kept {
         );
         let now: HashMap<String, String> = self
             .graph
-            .statuses(state)
+            .statuses(state.action_states.iter())
             .map(|(id, status)| (id.to_owned(), status.to_owned()))
             .collect();
         let complete = state.action_states.total() == now.len();

@@ -45,7 +45,7 @@ struct Shown {
 
 impl Shown {
     fn read(state: &StateView) -> Option<Self> {
-        let all = || state.action_states.iter().take(ACTIONS);
+        let all = || state.all_action_states().take(ACTIONS);
         let finished = all().filter(|action| action.action_status.is("FINISHED"));
         let acts = |action: &ActionState| !action.is_over() && !action.action_status.is("WAITING");
         Some(Self {

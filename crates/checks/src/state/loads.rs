@@ -91,7 +91,7 @@ impl Running for Loads {
         self.place(state, record.seq(), findings);
         let fatal = state.errors.iter().any(|error| !error.error_level.is("WARNING"));
         let status = |action: &ActionState| action.action_status.is("FINISHED");
-        let all = || state.action_states.iter().take(MANY);
+        let all = || state.all_action_states().take(MANY);
         let ended = all().any(|action| status(action) && self.open.contains(action.action_id.or_empty()));
         let open = all().filter(|action| !status(action));
         self.open = open.map(|action| action.action_id.or_empty().to_owned()).collect();

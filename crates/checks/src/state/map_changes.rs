@@ -204,8 +204,7 @@ impl Running for MapChanges {
         // What was asked for may still be about to be done until every map action that was seen has ended.
         let ended = |(id, since): (&String, &Moment)| {
             let action = state
-                .action_states
-                .iter()
+                .all_action_states()
                 .find(|action| action.action_id.or_empty() == id);
             match action.map(|action| action.action_status.or_empty()) {
                 Some(status) => matches!(status, "FINISHED" | "FAILED"),

@@ -59,7 +59,7 @@ impl Running for PausedActions {
             return false;
         };
         let before = std::mem::take(&mut self.before);
-        let listed = state.action_states.iter().take(ACTIONS);
+        let listed = state.all_action_states().take(ACTIONS);
         let paused: Vec<&str> = listed
             .filter(|action| action.action_status.is("PAUSED"))
             .map(|action| action.action_id.or_empty())

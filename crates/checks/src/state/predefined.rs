@@ -63,7 +63,7 @@ impl Running for Statuses {
         let held = is_held(state);
         let predefined = context.pack.vocabulary().get("action");
         let mut judged = false;
-        for action in state.action_states.iter().take(ACTIONS) {
+        for action in state.all_action_states().take(ACTIONS) {
             let (kind, status) = (action.action_type.or_empty(), action.action_status.or_empty());
             let described = predefined.and_then(|all| all.get(kind)?.get("statuses")?.as_array());
             let Some(described) = described else { continue };
@@ -120,7 +120,7 @@ impl Running for Results {
             return false;
         };
         let mut judged = false;
-        for action in state.action_states.iter().take(ACTIONS) {
+        for action in state.all_action_states().take(ACTIONS) {
             let kind = action.action_type.or_empty();
             if !action.action_status.is("FINISHED") || !self.described.contains(kind) {
                 continue;

@@ -61,7 +61,7 @@ impl Running for Triggers {
         }
         let progress = *sequence;
         let mut open = BTreeSet::new();
-        for action in state.action_states.iter().take(ACTIONS) {
+        for action in state.all_action_states().take(ACTIONS) {
             let (id, status) = (action.action_id.or_empty(), action.action_status.or_empty());
             let places: Vec<&Placed> = sent
                 .iter()

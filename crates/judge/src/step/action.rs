@@ -262,7 +262,7 @@ impl Walking {
         }
         let message_json = self.last.as_ref().and_then(|entry| entry.json());
         let saves = self.verb.save.iter().filter_map(|(name, path)| {
-            let value = path.of(message_json?)?;
+            let value = path.of(message_json?, TOPIC, &self.names)?;
             Some((name.clone(), value.clone()))
         });
         let fine = matches!(

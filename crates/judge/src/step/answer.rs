@@ -117,7 +117,7 @@ pub(super) struct FirstAnswer {
 impl FirstAnswer {
     pub(super) fn of(verb: &Expect, position: Position, scene: &EvalContext<'_>) -> Self {
         let bound = |assertion: &Assertion| {
-            let bound = bind_pattern(assertion.selection.pattern.as_ref(), scene).ok()??;
+            let bound = bind_pattern(assertion.selection.pattern.as_ref(), &verb.subject(), scene).ok()??;
             bound.looks_back().then_some(bound)
         };
         let asserted: Vec<Bound> = verb.assert.iter().filter_map(bound).collect();

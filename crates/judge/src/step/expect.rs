@@ -130,7 +130,7 @@ impl Expecting {
         }
         let message = entry.subject();
         let saves = self.verb.save.iter().filter_map(|(name, path)| {
-            let value = path.of(message.as_deref()?)?;
+            let value = path.of(message.as_deref()?, &self.verb.topic, scene.pack.names())?;
             Some((name.clone(), value.clone()))
         });
         let outcome = StepOutcome {

@@ -30,6 +30,7 @@ use tck_journal::Entry;
 use tck_pack::RequirementId;
 use tck_result::NearestMiss;
 use tck_suite::model::{Assertion, Binding, From, Selection, Step, Verb};
+use tck_suite::spelled;
 
 /// Where the test stands when a step begins.
 #[derive(Clone, Copy, Debug)]
@@ -278,7 +279,7 @@ impl Selector {
         position: Position,
         scene: &EvalContext<'_>,
     ) -> Result<Self, String> {
-        let pattern = bind_pattern(selection.pattern.as_ref(), scene)?;
+        let pattern = bind_pattern(selection.pattern.as_ref(), subject, scene)?;
         let span = match (&selection.pattern, &selection.check) {
             (Some(pattern), _) => pattern.span.clone(),
             (None, Some(check)) => check.span.clone(),
@@ -395,9 +396,14 @@ pub(super) fn keep_nearest(best: &mut Option<Near>, candidate: Option<Near>) {
     }
 }
 
-pub(super) fn bind_pattern(pattern: Option<&Pattern>, scene: &EvalContext<'_>) -> Result<Option<Bound>, String> {
+/// A picture with its variables filled in, and with the names of the version.
+pub(super) fn bind_pattern(
+    pattern: Option<&Pattern>,
+    subject: &str,
+    scene: &EvalContext<'_>,
+) -> Result<Option<Bound>, String> {
     pattern
-        .map(|pattern| pattern.bind(scene.bindings))
+        .map(|pattern| spelled(pattern, scene.pack.names(), subject).bind(scene.bindings))
         .transpose()
         .map_err(|unbound| unbound_text(&unbound))
 }

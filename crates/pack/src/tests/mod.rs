@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::FindingKind::Type;
 use super::schema::obeys_meta_schema;
-use super::{Assets, FindingKind, Pack, Packs};
+use super::{Assets, FindingKind, Pack, Packs, Role};
 
 mod breakages;
 mod disputed;
@@ -307,21 +307,33 @@ fn only_the_newest_versions_may_be_for_messages_alone() {
     let packs = packs();
     let last = packs.all().last().expect("a pack");
     assert!(packs.latest().judges_devices() && packs.of_devices().count() >= 2);
-    for pack in packs.all() {
-        let found = packs.for_devices(&pack.id);
-        assert_eq!(found.is_ok(), pack.judges_devices());
+    for (pack, role) in packs
+        .all()
+        .iter()
+        .flat_map(|pack| [(pack, Role::Agv), (pack, Role::MasterControl)])
+    {
+        let found = packs.for_devices(&pack.id, role);
+        assert_eq!(found.is_ok(), pack.judges(role));
         assert!(
             pack.judges_devices() || pack.id == last.id,
             "{} has newer ones",
             pack.id
         );
         if let Err(none) = found {
-            assert_eq!(none.code(), "messages-only");
+            let code = if pack.judges(Role::Agv) {
+                "other-side-only"
+            } else {
+                "messages-only"
+            };
+            assert_eq!(none.code(), code);
             let (said, hint) = (none.to_string(), none.hint());
             assert!(said.contains(&pack.version.to_string()) && hint.contains(&packs.latest().version.to_string()));
         }
     }
-    assert_eq!(packs.for_devices("9.9").expect_err("none").code(), "unknown-version");
+    assert_eq!(
+        packs.for_devices("9.9", Role::Agv).expect_err("none").code(),
+        "unknown-version"
+    );
 }
 
 #[test]

@@ -9,7 +9,7 @@ use super::actions::Origin;
 use super::objections::{Asked, Lack, Objection};
 use super::order_message::{Edge, Node, Order};
 use super::order_state::Place;
-use super::rejection::{Refusal, Rule};
+use super::rejection::{Detail, Refusal, Rule};
 use super::{Agv, motion};
 
 /// How far an edge orientation may be from forwards or backwards, in radians: the vehicle has two driven wheels.
@@ -42,8 +42,12 @@ impl Agv {
         self.check_zone_set(order)?;
         let usable = |path: &String| path.rsplit('.').next().is_some_and(|field| self.config.uses(field));
         for path in order.unsupported.iter().filter(|path| !usable(path)) {
-            let refusal = Refusal::at_field(Rule::Unable, &format!("the vehicle has no use for {path}"), path);
-            self.object(Objection::Unused(path, update), refusal)?;
+            let refusal = Refusal::at_field(
+                Rule::Unable,
+                &format!("the vehicle has no use for {}", self.spelled_path(path)),
+                path,
+            );
+            self.object(Objection::Unused(path, update), refusal.because(Detail::UnusedField))?;
         }
         if let Some(defect) = order.defects.first().filter(|_| self.config.trajectories) {
             return Err(defect.clone().into());

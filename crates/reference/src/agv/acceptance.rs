@@ -12,9 +12,10 @@ use super::action_kinds;
 use super::actions::{Action, Origin, Status};
 use super::hook_points::{Event, Permission};
 use super::objections::{Adoption, Objection, Relation};
-use super::order_message::{ActionRequest, Edge, Node, Order};
+use super::order_message::{ActionRequest, Blocking, Edge, Node, Order};
 use super::order_state::{OrderState, Stop};
-use super::rejection::{Refusal, Rule};
+use super::read::Defect;
+use super::rejection::{Detail, Refusal, Rule};
 
 /// What to do with an order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +36,7 @@ impl Agv {
             Err(Refusal::new(Rule::Malformed, "the message is too long"))
         } else {
             serde_json::from_slice::<Value>(payload)
+                .map(|message| self.understood("order", message))
                 .map_err(|error| Refusal::new(Rule::Malformed, &format!("the message is not JSON: {error}")))
         };
         let result = match &message {
@@ -49,6 +51,7 @@ impl Agv {
     /// Takes an order over, or says why not.
     pub(crate) fn order_decided(&mut self, message: &Value) -> Result<(), Refusal> {
         let mut order = Order::read(&self.read(message))?;
+        self.check_blocking(&order)?;
         if let Some(defect) = order.graph_defect() {
             let objection = Objection::Graph(&order, &defect);
             self.object(objection, defect.clone().into())?;
@@ -94,6 +97,7 @@ impl Agv {
         let new = order.id != self.order.order_id;
         if !new && order.update_id == self.order.update_id {
             self.objected(order, Relation::Known)?;
+            self.check_repetition(order)?;
             let again = self.allows(Permission::BeginAgain, false);
             return Ok(if again { Decision::Begin } else { Decision::Discard });
         }
@@ -101,9 +105,9 @@ impl Agv {
             let refusal = Refusal::new(Rule::Outdated, "the order update is older than the current one");
             self.object(Objection::Outdated, refusal)?;
         }
-        if !self.mode.takes_orders() {
+        if !self.mode.keeps_orders() {
             let refusal = Refusal::new(Rule::OtherOrderActive, "the vehicle is not in an automatic mode");
-            self.object(Objection::Mode, refusal)?;
+            self.object(Objection::Mode, refusal.because(Detail::Mode))?;
         }
         if new {
             self.check_new(order)?;
@@ -112,6 +116,43 @@ impl Agv {
             self.check_update(order)?;
             Ok(Decision::Continue)
         }
+    }
+
+    /// What of an order is kept to tell a repetition from another content.
+    pub(crate) fn kept(&self, order: &Order) -> (Vec<Node>, Vec<Edge>) {
+        match self.config.has("strictUpdates") {
+            true => order.content(),
+            false => (Vec::new(), Vec::new()),
+        }
+    }
+
+    /// SINGLE is a word of some versions only.
+    fn check_blocking(&self, order: &Order) -> Result<(), Defect> {
+        let mut actions = order.actions().filter(|action| action.blocking == Blocking::Single);
+        match actions.next().filter(|_| !self.config.has("singleBlocking")) {
+            None => Ok(()),
+            Some(action) => Err(Defect {
+                path: action.path.replace("actionType", "blockingType"),
+                reason: "is not a value of the enumeration",
+            }),
+        }
+    }
+
+    /// Whether an order that has the ids of the one there is says the same, and is no update of one that was cancelled; where the
+    /// version says anything of that.
+    fn check_repetition(&self, order: &Order) -> Result<(), Refusal> {
+        if !self.config.has("strictUpdates") {
+            return Ok(());
+        }
+        if self.order.cancel.is_some() || self.order.cancelled {
+            let refusal = Refusal::new(Rule::BrokenUpdate, "the order was cancelled");
+            self.object(Objection::Cancelled, refusal.because(Detail::Cancelled))?;
+        }
+        if self.order.content != order.content() {
+            let refusal = Refusal::new(Rule::Duplicate, "the order there is has these ids and another content");
+            self.object(Objection::OtherContent, refusal)?;
+        }
+        Ok(())
     }
 
     /// Whether the vehicle may begin a new order: it has none, can do it, and stands where the order begins (ORD-04,
@@ -123,6 +164,10 @@ impl Agv {
             self.object(Objection::Busy, refusal)?;
         }
         self.objected(order, Relation::New)?;
+        if order.update_id != 0 && self.config.has("strictUpdates") {
+            let refusal = Refusal::at_field(Rule::Malformed, "a new order has orderUpdateId 0", "orderUpdateId");
+            self.object(Objection::UpdateId, refusal)?;
+        }
         if first.sequence_id != 0 {
             let path = format!("{}.sequenceId", first.path);
             let refusal = Refusal::at_field(Rule::Malformed, "a new order begins with sequenceId 0", &path);
@@ -176,6 +221,7 @@ impl Agv {
         self.order.order_id.clone_from(&order.id);
         self.order.update_id = order.update_id;
         self.order.zoned = order.zone_set.is_some();
+        self.order.content = self.kept(&order);
         self.append(order.nodes, order.edges);
         self.happens(Event::Begun);
     }
@@ -184,7 +230,7 @@ impl Agv {
     fn forget_actions(&mut self) {
         self.actions.drop_lists();
         let old = |action: &&Action| {
-            let usual = action.of_order() || action.status.is_terminal();
+            let usual = action.of_order() || action.status.is_terminal() && !self.config.has("instantActionStates");
             self.allows(Permission::Forget(action), usual)
         };
         let old: Vec<String> = self.actions.iter().filter(old).map(Action::id).collect();

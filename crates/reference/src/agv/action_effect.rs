@@ -24,6 +24,7 @@ const FARTHEST: f64 = 10_000.0;
 pub(crate) enum Area {
     InstantAction,
     Map,
+    DuplicateMap,
     Localization,
     Load,
     Charging,
@@ -59,6 +60,14 @@ impl Problem {
             problem.references.push((key.to_owned(), action.text(key).to_owned()));
         }
         problem
+    }
+
+    /// A map that is on board already.
+    pub(crate) fn duplicate_map(action: &Action, reason: &str) -> Self {
+        Self {
+            area: Area::DuplicateMap,
+            ..Self::map(action, reason)
+        }
     }
 
     /// An instant action that cannot be performed.
@@ -190,7 +199,12 @@ impl Agv {
 
     /// Ends an action without success, and says why (IACT-06, BP-03).
     pub(crate) fn fail(&mut self, id: &str, problem: &Problem) {
-        self.end_failed(id);
+        let tried_again = |action: &Action| action.request.retriable && action.status == Status::Running;
+        let retriable = self.config.has("retry") && self.actions.get(id).is_some_and(tried_again);
+        match self.actions.get_mut(id).filter(|_| retriable) {
+            Some(action) => action.end(Status::Retriable),
+            None => self.end_failed(id),
+        }
         self.report_failure(id, problem);
     }
 
@@ -206,9 +220,16 @@ impl Agv {
         let name = match problem.area {
             Area::InstantAction => &names.instant_action,
             Area::Map => &names.map,
+            Area::DuplicateMap => &names.duplicate_map,
             Area::Localization => &names.localization,
             Area::Load => &names.load,
             Area::Charging => &names.charging,
+        };
+        // A version that has an error for instant actions has it for all that cannot be performed.
+        let is_instant = self.actions.get(id).is_some_and(|action| !action.of_order());
+        let name = match is_instant && self.config.error_rules.contains_key(&names.instant_action) {
+            true if problem.area != Area::DuplicateMap => &names.instant_action,
+            _ => name,
         };
         let error = ActiveError {
             error_type: name.clone(),
@@ -259,7 +280,31 @@ impl Agv {
                 Outcome::Open
             }
             Effect::DownloadMap => self.begin_download(&action.request.id),
+            Effect::ClearInstantActions => {
+                let stays = |action: &Action| action.of_order() || !action.status.is_terminal();
+                self.actions.retain(stays);
+                Outcome::Done(None)
+            }
+            Effect::Retry => self.decide_retriable(action, Status::Running),
+            Effect::SkipRetry => self.decide_retriable(action, Status::Failed),
         }
+    }
+
+    /// Fleet control says what becomes of an action that may be tried again.
+    fn decide_retriable(&mut self, action: &Action, becomes: Status) -> Outcome {
+        let id = action.text("actionId").to_owned();
+        if self
+            .actions
+            .get(&id)
+            .is_none_or(|named| named.status != Status::Retriable)
+        {
+            return Outcome::Failed(Problem::unable(action, "no such action waits for a retry"));
+        }
+        match becomes {
+            Status::Failed => self.end_failed(&id),
+            _ => self.run_action(&id),
+        }
+        Outcome::Done(None)
     }
 
     /// Whether a switch forbids what a message asks for (ACT-16).

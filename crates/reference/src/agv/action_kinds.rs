@@ -46,6 +46,9 @@ pub(crate) enum Effect {
     FinePositioning,
     WaitForTrigger,
     CancelOrder,
+    ClearInstantActions,
+    Retry,
+    SkipRetry,
     FactsheetRequest,
     WarningLights,
     Beep,
@@ -139,6 +142,7 @@ const DOWNLOAD: &[Parameter] = &[
     required("mapDownloadLink", "STRING"),
     optional("mapHash", "STRING"),
 ];
+const NAMED: &[Parameter] = &[required("actionId", "STRING")];
 const STATION: &[Parameter] = &[optional("stationType", "STRING"), optional("stationName", "STRING")];
 
 const fn kind(
@@ -184,7 +188,7 @@ impl ActionKind {
 }
 
 /// All actions, in the order of the factsheet.
-const KINDS: [ActionKind; 20] = [
+const KINDS: [ActionKind; 23] = [
     kind(
         "startPause",
         Effect::StartPause,
@@ -272,6 +276,27 @@ const KINDS: [ActionKind; 20] = [
     ),
     kind("cancelOrder", Effect::CancelOrder, INSTANT, &[], "Gives the order up"),
     kind(
+        "clearInstantActions",
+        Effect::ClearInstantActions,
+        INSTANT_NODE,
+        &[],
+        "Removes instant actions that have ended from their list",
+    ),
+    kind(
+        "retry",
+        Effect::Retry,
+        INSTANT,
+        NAMED,
+        "Tries an action again that has failed",
+    ),
+    kind(
+        "skipRetry",
+        Effect::SkipRetry,
+        INSTANT,
+        NAMED,
+        "Lets an action fail that could be tried again",
+    ),
+    kind(
         "factsheetRequest",
         Effect::FactsheetRequest,
         INSTANT,
@@ -313,6 +338,8 @@ fn is_offered(config: &AgvConfig, kind: &ActionKind) -> bool {
     let in_version = match kind.effect {
         Effect::EnableMap | Effect::DownloadMap | Effect::DeleteMap => config.has("mapActions"),
         Effect::FactsheetRequest => config.has("factsheetRequest"),
+        Effect::ClearInstantActions => config.has("instantActionStates"),
+        Effect::Retry | Effect::SkipRetry => config.has("retry"),
         _ => true,
     };
     in_version && !config.without_actions.contains(kind.name)

@@ -12,7 +12,7 @@ use serde_json::Value;
 use tck_base::clock::Moment;
 
 use super::action_kinds::ActionKind;
-use super::order_message::{ActionRequest, Blocking};
+use super::order_message::ActionRequest;
 
 /// actionStatus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,6 +21,8 @@ pub(crate) enum Status {
     Initializing,
     Running,
     Paused,
+    /// It has failed, and waits for what is decided of that.
+    Retriable,
     Finished,
     Failed,
 }
@@ -33,6 +35,7 @@ impl Status {
             Self::Initializing => "INITIALIZING",
             Self::Running => "RUNNING",
             Self::Paused => "PAUSED",
+            Self::Retriable => "RETRIABLE",
             Self::Finished => "FINISHED",
             Self::Failed => "FAILED",
         }
@@ -43,9 +46,12 @@ impl Status {
         matches!(self, Self::Finished | Self::Failed)
     }
 
-    /// INITIALIZING, RUNNING or PAUSED.
+    /// INITIALIZING, RUNNING, PAUSED or RETRIABLE.
     pub(crate) fn is_active(self) -> bool {
-        matches!(self, Self::Initializing | Self::Running | Self::Paused)
+        matches!(
+            self,
+            Self::Initializing | Self::Running | Self::Paused | Self::Retriable
+        )
     }
 }
 
@@ -103,7 +109,7 @@ impl Action {
 
     /// Whether it may run beside others.
     fn shares(&self) -> bool {
-        self.request.blocking != Blocking::Hard
+        self.request.blocking.shares()
     }
 
     /// Ends the action.

@@ -6,7 +6,6 @@
 use super::Agv;
 use super::actions::{Action, List, Origin, Status};
 use super::hook_points::{Event, Permission};
-use super::order_message::Blocking;
 
 impl Agv {
     /// A node was traversed, or an edge entered: its actions are triggered (NODE-04, NODE-06).
@@ -36,7 +35,7 @@ impl Agv {
         if running.any(|action| !action.status.is_terminal() && awaits(action)) {
             return false;
         }
-        let hard = |action: &Action| action.request.blocking == Blocking::Hard;
+        let hard = |action: &Action| !action.request.blocking.shares();
         let alone = next.len() == 1 && next.iter().filter_map(|id| self.actions.get(id)).any(hard);
         let mut others = self.actions.iter().filter(|action| action.occupies());
         !others.any(|action| (alone || hard(action)) && awaits(action))
@@ -46,7 +45,7 @@ impl Agv {
     /// BLOCK-07).
     pub(crate) fn actions_forbid_driving(&self) -> bool {
         let stops = |action: &Action| {
-            let free = action.request.blocking == Blocking::None;
+            let free = action.request.blocking.lets_drive();
             !self.allows(Permission::DriveDuring(action), free)
         };
         let lists = self.actions.lists.iter();
@@ -59,7 +58,7 @@ impl Agv {
     pub(crate) fn stops_on_edge(&self, sequence_id: u32) -> bool {
         let of_edge = |action: &&Action| action.origin == Origin::Edge(sequence_id);
         self.actions.iter().filter(of_edge).any(|action| {
-            let free = action.request.blocking == Blocking::None;
+            let free = action.request.blocking.lets_drive();
             action.status == Status::Waiting && !self.allows(Permission::PassOver(action), free)
         })
     }

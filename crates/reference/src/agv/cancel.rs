@@ -15,7 +15,7 @@ impl Agv {
     /// A cancelOrder action begins.
     pub(crate) fn cancel_order(&mut self, action_id: &str) {
         let active = !self.order.nodes.is_empty() || self.actions.order_unfinished();
-        if !active || self.order.cancel.is_some() || self.order.cancelled {
+        if self.means_another_order(action_id) || !active || self.order.cancel.is_some() || self.order.cancelled {
             self.nothing_to_cancel(action_id);
             return;
         }
@@ -39,6 +39,13 @@ impl Agv {
         }
     }
 
+    /// Whether a cancelOrder names an order that is not the one there is, where the version lets it name one.
+    fn means_another_order(&self, action_id: &str) -> bool {
+        let named = self.actions.get(action_id).map_or("", |action| action.text("orderId"));
+        let says_which = self.config.has("cancelByOrderId") && !named.is_empty();
+        says_which && self.allows(Permission::LeaveOrder, named != self.order.order_id)
+    }
+
     /// No order, or one that was cancelled before (ORD-CANCEL-18 to ORD-CANCEL-20).
     pub(crate) fn nothing_to_cancel(&mut self, action_id: &str) {
         if let Some(action) = self.actions.get_mut(action_id) {
@@ -54,7 +61,7 @@ impl Agv {
     }
 
     /// Ends the actions of the order, as far as they can be interrupted (ORD-CANCEL-03 to ORD-CANCEL-05).
-    fn stop_actions(&mut self) {
+    pub(crate) fn stop_actions(&mut self) {
         let interruptible = |action: &Action| match action.kind.map(|kind| kind.effect) {
             Some(Effect::WaitForTrigger) => true,
             Some(Effect::Calibrate) => false,

@@ -119,6 +119,7 @@ impl Agv {
         self.holds = super::Holds::default();
         self.strayed = false;
         self.mode = Mode::Automatic;
+        self.awaited_mode = None;
         self.charging = false;
         self.report = super::Report::default();
         if self.connection.online {
@@ -154,15 +155,56 @@ impl Agv {
             "SEMIAUTOMATIC" => Mode::Semiautomatic,
             "MANUAL" => Mode::Manual,
             "SERVICE" => Mode::Service,
-            "TEACHIN" => Mode::Teachin,
+            "TEACHIN" | "TEACH_IN" => Mode::Teachin,
+            "STARTUP" => Mode::Startup,
+            "INTERVENED" => Mode::Intervened,
             _ => return,
         };
-        let by_hand = !mode.takes_orders() || !self.mode.takes_orders();
+        let by_hand = !mode.keeps_orders() || !self.mode.keeps_orders();
         self.happens(Event::ModeChanging(mode));
         let kept = self.allows(Permission::KeepOrder(mode), !by_hand || mode == self.mode);
         if !kept && self.is_occupied() {
+            if self.config.has("modesClear") && self.winds_up(mode) {
+                return;
+            }
             self.give_up_order();
             self.happens(Event::GivenUpForMode(mode));
+        }
+        self.enter_mode(mode);
+    }
+
+    /// What cannot be broken off ends before the mode is told (ORD-CLEAR-05, ORD-CLEAR-09); whether there is anything such.
+    fn winds_up(&mut self, mode: Mode) -> bool {
+        if !self.allows(Permission::EndActions, true) {
+            return false;
+        }
+        self.stop_actions();
+        let is_left = self.actions.order_unfinished();
+        self.awaited_mode = is_left.then_some(mode);
+        is_left
+    }
+
+    /// Goes over to a mode that had to wait, once no action of the order is left.
+    pub(crate) fn settle_mode(&mut self) -> bool {
+        if self.actions.order_unfinished() {
+            return false;
+        }
+        let Some(mode) = self.awaited_mode.take() else {
+            return false;
+        };
+        self.give_up_order();
+        self.happens(Event::GivenUpForMode(mode));
+        self.enter_mode(mode);
+        true
+    }
+
+    /// Tells the mode, and no node any more where it cannot know what is done to it (MODE-15).
+    fn enter_mode(&mut self, mode: Mode) {
+        if mode.keeps_orders() {
+            self.errors.available();
+        }
+        if self.config.has("modesClear") && matches!(mode, Mode::Service | Mode::Teachin | Mode::Startup) {
+            self.order.last_node.clear();
         }
         let before = std::mem::replace(&mut self.mode, mode);
         self.happens(Event::ModeChanged(before));

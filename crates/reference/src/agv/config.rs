@@ -9,6 +9,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
+use tck_view::Names;
+
 use super::read::MAX_STRING;
 
 /// Names of the load handling devices.
@@ -80,6 +82,54 @@ pub struct ErrorNames {
     pub emergency_stop: String,
     /// The vehicle is outside its corridor (CORR-07).
     pub outside_of_corridor: String,
+    /// An optional field that the vehicle has no use for (OPT-02).
+    pub unsupported: String,
+    /// Other content under the ids of the order there is (ORD-REJ-13).
+    pub same_update: String,
+    /// An update of an order that was cancelled.
+    pub after_cancel: String,
+    /// An order in a mode that takes none (MODE-02).
+    pub not_available: String,
+    /// A map that is on board is to be downloaded (MAP-23).
+    pub duplicate_map: String,
+}
+
+/// What a protocol version says of an error that it names.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ErrorRule {
+    /// errorLevel.
+    pub level: String,
+    /// How long it stands.
+    pub until: ErrorEnd,
+}
+
+/// What ends an error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ErrorEnd {
+    /// A new order is accepted.
+    NewOrder,
+    /// A new instant action is accepted.
+    InstantAction,
+    /// An instant action about maps is accepted.
+    MapAction,
+    /// The mode allows orders.
+    Mode,
+    /// As its cause wants.
+    Cause,
+}
+
+impl ErrorEnd {
+    /// What a vocabulary calls it.
+    #[must_use]
+    pub fn of_word(word: &str) -> Self {
+        match word {
+            "new-order" => Self::NewOrder,
+            "new-instant-action" => Self::InstantAction,
+            "map-action" => Self::MapAction,
+            "mode" => Self::Mode,
+            _ => Self::Cause,
+        }
+    }
 }
 
 impl Default for ErrorNames {
@@ -102,6 +152,11 @@ impl Default for ErrorNames {
             load: name("loadError"),
             emergency_stop: name("emergencyStop"),
             outside_of_corridor: name("outsideOfCorridor"),
+            unsupported: name("orderError"),
+            same_update: name("orderUpdateError"),
+            after_cancel: name("orderUpdateError"),
+            not_available: name("orderError"),
+            duplicate_map: name("mapError"),
         }
     }
 }
@@ -124,6 +179,12 @@ impl ErrorNames {
             (&mut names.instant_action, "error.unknownInstantAction"),
             (&mut names.map, "error.mapDownload"),
             (&mut names.load, "error.actionFailed"),
+            (&mut names.outside_of_corridor, "error.outsideCorridor"),
+            (&mut names.unsupported, "error.unsupportedField"),
+            (&mut names.same_update, "error.sameUpdate"),
+            (&mut names.after_cancel, "error.updateAfterCancel"),
+            (&mut names.not_available, "error.notAvailable"),
+            (&mut names.duplicate_map, "error.duplicateMap"),
         ];
         for (name, path) in entries {
             if let Some(word) = word(path) {
@@ -146,10 +207,16 @@ pub struct AgvConfig {
     /// Full topic by topic name. A topic that is missing is neither subscribed nor published.
     pub topics: BTreeMap<String, String>,
     /// Features of the protocol version, by the names the packs use: `maps` (in the state), `mapActions`,
-    /// `factsheetRequest`, `retainedFactsheet`, `vehicleConfig`, `localizationParameters`, `cancelRunsFromReceipt`.
+    /// `factsheetRequest`, `retainedFactsheet`, `vehicleConfig` and so on.
     pub features: BTreeSet<String>,
+    /// What the protocol version calls the members of messages: the vehicle thinks by their usual names.
+    pub names: Names,
+    /// How many digits a timestamp has behind the second.
+    pub timestamp_digits: usize,
     /// Names of errors.
     pub errors: ErrorNames,
+    /// What the version says of errors, by their names; a WARNING that ends as its cause wants where it says nothing.
+    pub error_rules: BTreeMap<String, ErrorRule>,
     /// The factsheet says only what it has to.
     pub minimal_factsheet: bool,
     /// Predefined actions this vehicle does *not* offer.
@@ -265,7 +332,10 @@ impl Default for AgvConfig {
             ]
             .map(String::from)
             .into(),
+            names: Names::default(),
+            timestamp_digits: 2,
             errors: ErrorNames::default(),
+            error_rules: BTreeMap::new(),
             minimal_factsheet: false,
             without_actions: BTreeSet::new(),
             nodes: nodes.into(),

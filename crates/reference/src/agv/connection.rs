@@ -77,6 +77,11 @@ impl Connection {
         }
     }
 
+    /// The headerId of the last message of a topic name; 0 where there was none.
+    pub(crate) fn last_header_id(&self, name: &str) -> u32 {
+        self.header_ids.get(name).map_or(0, |next| next.wrapping_sub(1))
+    }
+
     /// Counts a message that is not sent.
     pub(crate) fn skip_header_id(&mut self, name: &str) {
         if let Some(next) = self.header_ids.get_mut(name) {
@@ -105,6 +110,7 @@ impl Agv {
             // The will does not count: it has the headerId of the message that would be next.
             let mut message = self.header("connection", false);
             message.insert("connectionState".into(), json!("CONNECTIONBROKEN"));
+            self.spell("connection", &mut message);
             Publication {
                 topic,
                 payload: Value::Object(message).to_string().into(),
@@ -211,7 +217,8 @@ impl Agv {
         if !self.sends(&mut outgoing) {
             return;
         }
-        let message = std::mem::take(&mut outgoing.message);
+        let mut message = std::mem::take(&mut outgoing.message);
+        self.spell(name, &mut message);
         let mut payload = Value::Object(message).to_string().into_bytes();
         self.writes(&outgoing, &mut payload);
         self.pending.push(Output::Publish(Publication {
@@ -231,7 +238,10 @@ impl Agv {
         }
         let mut header = Map::new();
         header.insert("headerId".into(), json!(id));
-        header.insert("timestamp".into(), json!(format!("{:.2}", self.now.utc)));
+        header.insert(
+            "timestamp".into(),
+            json!(format!("{:.*}", self.config.timestamp_digits, self.now.utc)),
+        );
         header.insert("version".into(), json!(self.config.version));
         header.insert("manufacturer".into(), json!(self.config.manufacturer));
         header.insert("serialNumber".into(), json!(self.config.serial_number));

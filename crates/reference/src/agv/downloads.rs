@@ -63,6 +63,9 @@ impl Agv {
                 "the link is not HTTP",
             ),
         ];
+        if known {
+            return Outcome::Failed(Problem::duplicate_map(&action, hindrances[0].1));
+        }
         if let Some((_, reason)) = hindrances.iter().find(|(hinders, _)| *hinders) {
             return Outcome::Failed(Problem::map(&action, reason));
         }

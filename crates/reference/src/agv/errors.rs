@@ -15,6 +15,12 @@ pub(crate) const MAX_ERRORS: usize = 20;
 pub(crate) enum Life {
     /// When a new order is accepted (ORD-REJ-03, ORD-REJ-08).
     UntilNewOrder,
+    /// When an instant action is accepted.
+    UntilInstantAction,
+    /// When an instant action about maps is accepted.
+    UntilMapAction,
+    /// When the mode allows orders.
+    UntilAvailable,
     /// At a time, or when a new order is accepted.
     Until(Moment),
     /// While the emergency stop is active.
@@ -61,9 +67,29 @@ impl Errors {
         self.active.retain(|error| {
             matches!(
                 error.life,
-                Life::WhileStopped | Life::WhileOutside | Life::WhileDefective | Life::Always
+                Life::WhileStopped
+                    | Life::WhileOutside
+                    | Life::WhileDefective
+                    | Life::Always
+                    | Life::UntilInstantAction
+                    | Life::UntilMapAction
+                    | Life::UntilAvailable
             )
         });
+    }
+
+    /// An instant action was accepted, and whether it is about maps.
+    pub(crate) fn instant_action(&mut self, about_maps: bool) {
+        self.active.retain(|error| match error.life {
+            Life::UntilInstantAction => false,
+            Life::UntilMapAction => !about_maps,
+            _ => true,
+        });
+    }
+
+    /// The mode allows orders.
+    pub(crate) fn available(&mut self) {
+        self.active.retain(|error| error.life != Life::UntilAvailable);
     }
 
     /// Forgets what was refused.
@@ -119,13 +145,13 @@ impl Errors {
 
 impl ActiveError {
     /// The error as a state lists it.
-    pub(crate) fn picture(&self) -> Value {
+    pub(crate) fn picture(&self, usual_level: &str) -> Value {
         let references = self.references.iter();
         let references = references.map(|(key, value)| json!({ "referenceKey": key, "referenceValue": value }));
         json!({
             "errorType": self.error_type,
             "errorDescription": self.description,
-            "errorLevel": if self.fatal { "FATAL" } else { "WARNING" },
+            "errorLevel": if self.fatal { "FATAL" } else { usual_level },
             "errorReferences": references.collect::<Vec<_>>(),
         })
     }

@@ -4,8 +4,10 @@
 
 use serde_json::{Map, Value, json};
 
+use tck_view::Topic;
+
 use super::ability::SLOWEST;
-use super::action_kinds::{self, ActionKind, MAX_HEIGHT};
+use super::action_kinds::{self, ActionKind, Effect, MAX_HEIGHT};
 use super::config::LOAD_POSITIONS;
 use super::errors::MAX_ERRORS;
 use super::hook_points::Part;
@@ -166,12 +168,29 @@ impl Agv {
             .iter()
             .chain(special)
             .chain(zones)
+            .filter_map(|name| self.spelled_parameter(name))
+            .chain(
+                self.config
+                    .has("retry")
+                    .then(|| "order.nodes.actions.retriable".to_owned()),
+            )
             .map(|name| json!({ "parameter": name, "support": "SUPPORTED" }))
             .collect();
         let actions: Vec<Value> = action_kinds::offered(&self.config)
             .map(|kind| self.action_picture(kind))
             .collect();
         json!({ "optionalParameters": parameters, "agvActions": actions })
+    }
+
+    /// An optional parameter as the version writes it, if it has it.
+    fn spelled_parameter(&self, name: &str) -> Option<String> {
+        let (topic, path) = name.split_once('.')?;
+        let names: Vec<&str> = path.split('.').collect();
+        let own = self
+            .config
+            .names
+            .spelled_names(Topic::of_name(topic).object(), &names)?;
+        Some(format!("{topic}.{}", own.join(".")))
     }
 
     fn action_picture(&self, kind: &ActionKind) -> Value {
@@ -194,7 +213,17 @@ impl Agv {
             picture.insert("resultDescription".into(), json!(result));
         }
         if self.config.has("vehicleConfig") {
-            picture.insert("blockingTypes".into(), json!(["NONE", "SOFT", "HARD"]));
+            let all = ["NONE", "SOFT", "HARD", "SINGLE"];
+            let known = if self.config.has("singleBlocking") { 4 } else { 3 };
+            picture.insert("blockingTypes".into(), json!(all[..known]));
+        }
+        if self.config.has("actionFlags") {
+            let cancels = self.config.interruptible && kind.effect != Effect::Calibrate;
+            picture.insert("pauseAllowed".into(), json!(kind.pausable));
+            picture.insert(
+                "cancelAllowed".into(),
+                json!(cancels || kind.effect == Effect::WaitForTrigger),
+            );
         }
         Value::Object(picture)
     }
@@ -246,7 +275,8 @@ fn strip(body: &mut Map<String, Value>) {
         features["optionalParameters"] = json!([]);
         for action in features["agvActions"].as_array_mut().into_iter().flatten() {
             if let Some(action) = action.as_object_mut() {
-                action.retain(|key, _| matches!(key.as_str(), "actionType" | "actionScopes"));
+                let kept = ["actionType", "actionScopes", "pauseAllowed", "cancelAllowed"];
+                action.retain(|key, _| kept.contains(&key.as_str()));
             }
         }
     }

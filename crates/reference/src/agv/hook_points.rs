@@ -104,6 +104,8 @@ pub(crate) enum Permission<'a> {
     KeepHorizon(&'a Order),
     /// An action is forgotten with the horizon (ORD-UPD-10).
     ForgetWithHorizon,
+    /// A cancelOrder that names an order leaves the one there is alone (ORD-CANCEL-25).
+    LeaveOrder,
     /// It drives to its next node before a cancellation ends (ORD-CANCEL-09).
     CancelAtNode,
     /// A cancellation lasts until it has driven its way.
@@ -142,6 +144,8 @@ pub(crate) enum Permission<'a> {
     Report,
     /// An order is kept in another mode (MODE-05).
     KeepOrder(Mode),
+    /// What cannot be broken off ends before another mode is told (ORD-CLEAR-09).
+    EndActions,
     /// It is moved by hand (MODE-06).
     MoveByHand,
     /// A map is enabled on the vehicle (MAP-26).

@@ -11,7 +11,8 @@ use serde_json::{Map, Value};
 
 use super::action_effect::Outcome;
 use super::actions::{Action, Origin, Status};
-use super::errors::ActiveError;
+use super::config::ErrorEnd;
+use super::errors::{ActiveError, Life};
 use super::order_message::{Corridor, Edge, Order};
 use super::order_state::Stop;
 use super::rejection::{Refusal, Rule};
@@ -145,6 +146,14 @@ impl Agv {
 
     /// Lists an error, if it is to be listed.
     pub(crate) fn raise(&mut self, cause: Cause<'_>, mut error: ActiveError) {
+        let rule = self.config.error_rules.get(&error.error_type);
+        error.life = match rule.map_or(ErrorEnd::Cause, |rule| rule.until) {
+            ErrorEnd::NewOrder => Life::UntilNewOrder,
+            ErrorEnd::InstantAction => Life::UntilInstantAction,
+            ErrorEnd::MapAction => Life::UntilMapAction,
+            ErrorEnd::Mode => Life::UntilAvailable,
+            ErrorEnd::Cause => error.life,
+        };
         if self.raises(cause, &mut error) {
             self.errors.raise(error);
         }

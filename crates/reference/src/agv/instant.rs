@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::Agv;
 use super::action_effect::Problem;
-use super::action_kinds::{self, ActionKind, Scope};
+use super::action_kinds::{self, ActionKind, Effect, Scope};
 use super::actions::{Action, Origin, Status};
 use super::errors::{ActiveError, Life};
 use super::hook_points::{Cause, Event, Permission};
@@ -24,7 +24,8 @@ impl Agv {
         let message = if too_long {
             None
         } else {
-            serde_json::from_slice::<Value>(payload).ok()
+            let message = serde_json::from_slice::<Value>(payload).ok();
+            message.map(|message| self.understood("instantActions", message))
         };
         let Some(message) = message else {
             self.malformed("the message is not JSON or too long");
@@ -95,7 +96,15 @@ impl Agv {
             Some(reason) if self.allows(Permission::RefuseInstant(&action), true) => {
                 self.fail(&id, &Problem::unable(&action, &reason));
             }
-            None if self.allows(Permission::BeginInstant(&action), true) => self.begin_instant(&id),
+            None => {
+                let about_maps = |kind: &ActionKind| {
+                    matches!(kind.effect, Effect::EnableMap | Effect::DownloadMap | Effect::DeleteMap)
+                };
+                self.errors.instant_action(kind.is_some_and(about_maps));
+                if self.allows(Permission::BeginInstant(&action), true) {
+                    self.begin_instant(&id);
+                }
+            }
             _ => {}
         }
     }
@@ -146,6 +155,7 @@ fn read_leniently(fields: &Fields<'_>, id: String) -> (ActionRequest, Option<Def
         action_type: String::new(),
         id,
         blocking: Blocking::None,
+        retriable: false,
         parameters: Vec::new(),
     };
     let defect = fields

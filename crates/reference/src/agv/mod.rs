@@ -42,6 +42,7 @@ mod stations;
 mod tests;
 pub(crate) mod updates;
 pub(crate) mod way;
+mod wire;
 
 use std::collections::{BTreeSet, VecDeque};
 
@@ -49,7 +50,7 @@ use crate::{ConnectOptions, Device, Input, Output};
 use tck_base::clock::{Moment, Stamp};
 
 pub use commands::COMMANDS;
-pub use config::{AgvConfig, ErrorNames, LayoutNode, OnboardMap};
+pub use config::{AgvConfig, ErrorEnd, ErrorNames, ErrorRule, LayoutNode, OnboardMap};
 
 use actions::Actions;
 use connection::Connection;
@@ -69,12 +70,21 @@ pub(crate) enum Mode {
     Manual,
     Service,
     Teachin,
+    /// From its start on until it is ready.
+    Startup,
+    /// Somebody steps in, and the order waits.
+    Intervened,
 }
 
 impl Mode {
     /// Whether master control commands the vehicle (MODE-02).
     pub(crate) fn takes_orders(self) -> bool {
         matches!(self, Self::Automatic | Self::Semiautomatic)
+    }
+
+    /// Whether the order goes on when this mode ends.
+    pub(crate) fn keeps_orders(self) -> bool {
+        self.takes_orders() || self == Self::Intervened
     }
 }
 
@@ -125,6 +135,8 @@ pub struct Agv {
     pub(crate) errors: Errors,
     pub(crate) holds: Holds,
     pub(crate) mode: Mode,
+    /// The mode that it goes over to when the actions of its order have ended.
+    pub(crate) awaited_mode: Option<Mode>,
     pub(crate) loads: Vec<Load>,
     /// Edges on which something stands.
     pub(crate) obstacles: BTreeSet<String>,
@@ -194,6 +206,7 @@ impl Agv {
             errors: Errors::default(),
             holds: Holds::default(),
             mode: Mode::Automatic,
+            awaited_mode: None,
             loads: Vec::new(),
             obstacles: BTreeSet::new(),
             strayed: false,

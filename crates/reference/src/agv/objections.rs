@@ -13,6 +13,10 @@ pub(crate) enum Objection<'a> {
     Graph(&'a Order, &'a Defect),
     /// A new order does not begin with sequenceId 0.
     Begin,
+    /// The ids are those of the order there is, and the content is another one.
+    OtherContent,
+    /// A new order does not begin with orderUpdateId 0.
+    UpdateId,
     /// The orderUpdateId is lower than the current one (ORD-REJ-10).
     Outdated,
     /// The vehicle is in no automatic mode (MODE-02).

@@ -19,11 +19,28 @@ const FARTHEST: f64 = 1e8;
 pub(crate) enum Blocking {
     /// Driving and other actions.
     None,
+    /// Driving, no other actions.
+    Single,
     /// Other actions, no driving.
     Soft,
     /// Nothing.
     Hard,
 }
+
+impl Blocking {
+    /// Whether the vehicle may drive meanwhile.
+    pub(crate) fn lets_drive(self) -> bool {
+        matches!(self, Self::None | Self::Single)
+    }
+
+    /// Whether other actions may run beside it.
+    pub(crate) fn shares(self) -> bool {
+        matches!(self, Self::None | Self::Soft)
+    }
+}
+
+/// The words for them.
+pub(crate) const BLOCKING: [&str; 4] = ["NONE", "SOFT", "HARD", "SINGLE"];
 
 /// An action that was asked for.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,6 +49,8 @@ pub(crate) struct ActionRequest {
     pub(crate) action_type: String,
     pub(crate) id: String,
     pub(crate) blocking: Blocking,
+    /// Whether it may be tried again when it has failed.
+    pub(crate) retriable: bool,
     pub(crate) parameters: Vec<(String, Value)>,
 }
 
@@ -46,10 +65,11 @@ impl ActionRequest {
 
     /// Reads an action of an order, where every required field must be right.
     pub(crate) fn read(fields: &Fields<'_>) -> Result<Self, Defect> {
-        let blocking = match fields.literal("blockingType", &["NONE", "SOFT", "HARD"])? {
+        let blocking = match fields.literal("blockingType", &BLOCKING)? {
             0 => Blocking::None,
             1 => Blocking::Soft,
-            _ => Blocking::Hard,
+            2 => Blocking::Hard,
+            _ => Blocking::Single,
         };
         fields.optional("actionDescription", Fields::prose)?;
         Ok(Self {
@@ -57,6 +77,7 @@ impl ActionRequest {
             action_type: fields.id("actionType")?,
             id: fields.id("actionId")?,
             blocking,
+            retriable: fields.optional("retriable", Fields::boolean)? == Some(true),
             parameters: read_parameters(fields)?,
         })
     }
@@ -278,6 +299,11 @@ impl Order {
         None
     }
 
+    /// What it says, without header and ids.
+    pub(crate) fn content(&self) -> (Vec<Node>, Vec<Edge>) {
+        (self.nodes.clone(), self.edges.clone())
+    }
+
     /// All actions of nodes and edges.
     pub(crate) fn actions(&self) -> impl Iterator<Item = &ActionRequest> {
         let nodes = self.nodes.iter().flat_map(|node| &node.actions);
@@ -318,7 +344,7 @@ fn read_node(fields: &Fields<'_>) -> Result<Node, Defect> {
 
 fn read_edge(fields: &Fields<'_>, unsupported: &mut Vec<String>, defects: &mut Vec<Defect>) -> Result<Edge, Defect> {
     fields.optional("edgeDescription", Fields::prose)?;
-    fields.optional("length", Fields::number)?;
+    fields.optional("length", |fields, key| fields.number_in(key, 0.0, f64::MAX))?;
     for key in SPECIAL_EDGE_FIELDS {
         if fields.has(key) {
             unsupported.push(fields.at(key));

@@ -52,6 +52,8 @@ pub(crate) struct OrderState {
     pub(crate) cancelled: bool,
     /// The order names a zone set.
     pub(crate) zoned: bool,
+    /// What the last message of it said.
+    pub(crate) content: (Vec<Node>, Vec<Edge>),
     /// lastNodeId and lastNodeSequenceId before the present ones.
     pub(crate) previous: (String, u32),
 }
@@ -72,6 +74,7 @@ impl OrderState {
             left: (None, None),
             cancelled: false,
             zoned: false,
+            content: (Vec::new(), Vec::new()),
             previous: (String::new(), 0),
         }
     }

@@ -33,7 +33,8 @@ impl Agv {
                 | self.begin_waiting_instants()
                 | self.begin_triggered()
                 | self.drive()
-                | self.settle_cancel();
+                | self.settle_cancel()
+                | self.settle_mode();
             if !progress {
                 break;
             }
@@ -59,7 +60,10 @@ impl Agv {
             None => self.order.cancelled,
         };
         let hindrances = [
-            (Hindrance::Mode, !self.mode.takes_orders()),
+            (
+                Hindrance::Mode,
+                !self.mode.takes_orders() || self.awaited_mode.is_some(),
+            ),
             (Hindrance::Hold, self.holds.any()),
             (Hindrance::Cancellation, cancelled),
             (Hindrance::Action, self.actions_forbid_driving()),

@@ -24,10 +24,22 @@ pub(crate) enum Rule {
     Duplicate,
 }
 
+/// What a rule is broken by, where versions have an error of its own for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Detail {
+    /// An optional field that the vehicle has no use for (OPT-02).
+    UnusedField,
+    /// The order to be updated was cancelled.
+    Cancelled,
+    /// The mode takes no orders (MODE-02).
+    Mode,
+}
+
 /// An order that is not taken over.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Refusal {
     rule: Rule,
+    detail: Option<Detail>,
     reason: String,
     /// What in the message is wrong.
     culprits: Vec<(String, String)>,
@@ -37,6 +49,7 @@ impl Refusal {
     pub(crate) fn new(rule: Rule, reason: &str) -> Self {
         Self {
             rule,
+            detail: None,
             reason: reason.to_owned(),
             culprits: Vec::new(),
         }
@@ -44,6 +57,11 @@ impl Refusal {
 
     pub(crate) fn naming(mut self, key: &str, value: impl Into<String>) -> Self {
         self.culprits.push((key.to_owned(), value.into()));
+        self
+    }
+
+    pub(crate) fn because(mut self, detail: Detail) -> Self {
+        self.detail = Some(detail);
         self
     }
 
@@ -71,8 +89,15 @@ impl Agv {
             Rule::UnknownMap => &names.unknown_map,
             Rule::OtherOrderActive => &names.other_order_active,
             Rule::StartOutOfRange => &names.start_out_of_range,
-            Rule::Outdated | Rule::Duplicate => &names.outdated_update,
+            Rule::Outdated => &names.outdated_update,
+            Rule::Duplicate => &names.same_update,
             Rule::BrokenUpdate => &names.broken_update,
+        };
+        let name = match refusal.detail {
+            None => name,
+            Some(Detail::UnusedField) => &names.unsupported,
+            Some(Detail::Cancelled) => &names.after_cancel,
+            Some(Detail::Mode) => &names.not_available,
         };
         let life = match refusal.rule {
             Rule::Outdated | Rule::BrokenUpdate | Rule::Duplicate => {
@@ -81,7 +106,11 @@ impl Agv {
             _ => Life::UntilNewOrder,
         };
         let mut references = message_references(message);
-        references.extend(refusal.culprits);
+        let spelled = |(key, value): (String, String)| match key.as_str() {
+            "field" => (key, self.spelled_path(&value)),
+            _ => (key, value),
+        };
+        references.extend(refusal.culprits.into_iter().map(spelled));
         let error = ActiveError {
             error_type: name.to_owned(),
             fatal: false,

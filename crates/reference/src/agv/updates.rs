@@ -8,7 +8,7 @@ use super::actions::{Action, Origin};
 use super::hook_points::{Event, Permission};
 use super::objections::{Objection, Relation};
 use super::order_message::{Node, Order};
-use super::rejection::{Refusal, Rule};
+use super::rejection::{Detail, Refusal, Rule};
 
 impl Agv {
     /// Rows 8 and 10: whether the update continues the order. A running order is continued at its decision point
@@ -17,7 +17,7 @@ impl Agv {
         let cancelled = self.order.cancel.is_some() || self.order.cancelled;
         if cancelled {
             let refusal = Refusal::new(Rule::BrokenUpdate, "the order was cancelled");
-            self.object(Objection::Cancelled, refusal)?;
+            self.object(Objection::Cancelled, refusal.because(Detail::Cancelled))?;
         }
         self.objected(order, Relation::Update)?;
         let first = &order.nodes[0];
@@ -45,6 +45,7 @@ impl Agv {
             self.drop_horizon();
         }
         self.order.update_id = order.update_id;
+        self.order.content = self.kept(&order);
         self.append(order.nodes.into_iter().skip(1).collect(), order.edges);
         self.happens(Event::Updated);
     }

@@ -3,8 +3,9 @@
 use super::paths::Topic;
 use super::scope::Scope;
 use super::{Linter, within};
-use crate::model::{Binding, Extent, Path, Section, Send, Step, VehicleStep, Verb, Walk, Which};
+use crate::model::{Binding, Extent, Patch, Path, Section, Send, Step, VehicleStep, Verb, Walk, Which};
 use tck_base::diagnostic::{Diagnostic, Span};
+use tck_base::pattern::{Term, TermKind};
 use tck_journal::event::LinkFault;
 use tck_pack::Role;
 use tck_profile::{VEHICLE_WORDS, find_vehicle_word};
@@ -188,6 +189,82 @@ impl Linter<'_> {
 
     fn send(&mut self, send: &Send, packs: &[usize], at: &Span) {
         self.topic(&send.topic, packs, at, Vec::new());
+        if let Some(payload) = &send.payload {
+            self.written(payload, &send.topic, &mut Vec::new(), packs);
+        }
+        match &send.patch {
+            Some(Patch::Merge(term)) => self.written(term, &send.topic, &mut Vec::new(), packs),
+            Some(Patch::Operations(term)) => self.patched(term, &send.topic, packs),
+            None => {}
+        }
+    }
+
+    /// A patch is about members that a version has. One that only keeps the message in one piece, beside others, is left out where
+    /// there is nothing to be kept.
+    fn patched(&mut self, term: &Term, topic: &str, packs: &[usize]) {
+        let TermKind::List(operations) = &term.kind else { return };
+        let said = |operation: &Term, key: &str| match &operation.kind {
+            TermKind::Map(members) => members.iter().find_map(|(name, value)| match &value.kind {
+                TermKind::Literal(value) if name == key => value.as_str().map(str::to_owned),
+                _ => None,
+            }),
+            _ => None,
+        };
+        for pack in packs {
+            let is_lost = |operation: &&Term| {
+                let path = said(operation, "path").unwrap_or_default();
+                let names: Vec<&str> = path
+                    .split('/')
+                    .skip(1)
+                    .filter(|part| part.parse::<u32>().is_err())
+                    .collect();
+                self.vocabulary.lost(*pack, topic, &names)
+            };
+            let lost: Vec<&Term> = operations.iter().filter(is_lost).collect();
+            let all = lost.len() == operations.len();
+            let needed = lost
+                .into_iter()
+                .find(|one| all || said(one, "op").as_deref() != Some("replace"));
+            if let Some(operation) = needed {
+                let path = said(operation, "path").unwrap_or_default();
+                self.lost(*pack, topic, &[path.as_str()], &operation.span);
+                return;
+            }
+        }
+    }
+
+    /// What a payload says of a member that a version does not have any more would be left out without a word.
+    fn written<'t>(&mut self, term: &'t Term, topic: &str, path: &mut Vec<&'t str>, packs: &[usize]) {
+        match &term.kind {
+            TermKind::List(items) => {
+                for item in items {
+                    self.written(item, topic, path, packs);
+                }
+            }
+            TermKind::Map(members) => {
+                for (name, value) in members {
+                    path.push(name);
+                    match packs.iter().find(|pack| self.vocabulary.lost(**pack, topic, path)) {
+                        Some(pack) => self.lost(*pack, topic, path, &value.span),
+                        None => self.written(value, topic, path, packs),
+                    }
+                    path.pop();
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn lost(&mut self, pack: usize, topic: &str, path: &[&str], at: &Span) {
+        let version = self.vocabulary.versions().get(pack).map(ToString::to_string);
+        let title = format!(
+            "`{}` of {topic} is not in {}",
+            path.join("."),
+            version.unwrap_or_default()
+        );
+        let diagnostic = Diagnostic::new("unknown-path", at.clone(), title, "it would not be sent");
+        let hint = "narrow `spec:`, of the test or of this step";
+        self.problems.add(diagnostic.hint(hint));
     }
 
     fn saved(&mut self, save: &[(String, Path)], topic: &str, packs: &[usize], step: &Span) {

@@ -7,7 +7,7 @@ use std::rc::Rc;
 use serde_json::Value;
 
 use tck_pack::{Breakage, BreakageScope, Catalogue, Hooks, Packs, Role, Shape, Version};
-use tck_view::Field;
+use tck_view::{Field, Topic};
 
 /// What the catalogue says about one requirement.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,6 +32,8 @@ pub trait Vocabulary {
     fn breakages(&self, pack: usize, topic: &str, ground: &BreakageScope) -> Option<Vec<Breakage>>;
     /// Whether messages of a pack do not have a member.
     fn lacks(&self, pack: usize, member: Field) -> bool;
+    /// Whether messages of a topic do not have a member of earlier versions.
+    fn lost(&self, pack: usize, topic: &str, path: &[&str]) -> bool;
     /// A word of the vocabulary: `error.outdatedUpdate`.
     fn word(&self, pack: usize, path: &str) -> Option<Value>;
     /// A requirement.
@@ -79,7 +81,10 @@ impl Vocabulary for PackVocabulary<'_> {
     }
 
     fn shape(&self, pack: usize, topic: &str, path: &[&str]) -> Option<Rc<Shape>> {
-        let schema = self.packs.all().get(pack)?.schema(topic)?;
+        let of_pack = self.packs.all().get(pack)?;
+        let schema = of_pack.schema(topic)?;
+        let own = of_pack.names().spelled_names(Topic::of_name(topic).object(), path)?;
+        let path = own.as_slice();
         // Member names of our schemas have no line breaks; those of a suite may, and then only miss the memory.
         let mut key = format!("{pack}\n{topic}");
         for name in path {
@@ -97,8 +102,15 @@ impl Vocabulary for PackVocabulary<'_> {
     }
 
     fn members(&self, pack: usize, topic: &str, path: &[&str]) -> Vec<String> {
-        let schema = self.packs.all().get(pack).and_then(|pack| pack.schema(topic));
-        schema.map(|schema| schema.members(path)).unwrap_or_default()
+        let Some(of_pack) = self.packs.all().get(pack) else {
+            return Vec::new();
+        };
+        let path = of_pack.names().spelled_names(Topic::of_name(topic).object(), path);
+        let members = of_pack
+            .schema(topic)
+            .zip(path)
+            .map(|(schema, path)| schema.members(&path));
+        members.unwrap_or_default()
     }
 
     fn breakages(&self, pack: usize, topic: &str, ground: &BreakageScope) -> Option<Vec<Breakage>> {
@@ -109,6 +121,12 @@ impl Vocabulary for PackVocabulary<'_> {
     fn lacks(&self, pack: usize, member: Field) -> bool {
         let pack = self.packs.all().get(pack);
         pack.is_some_and(|pack| pack.names().lacks(member))
+    }
+
+    fn lost(&self, pack: usize, topic: &str, path: &[&str]) -> bool {
+        let object = Topic::of_name(topic).object();
+        let pack = self.packs.all().get(pack);
+        pack.is_some_and(|pack| pack.names().spelled_names(object, path).is_none())
     }
 
     fn word(&self, pack: usize, path: &str) -> Option<Value> {

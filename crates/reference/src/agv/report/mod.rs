@@ -13,9 +13,10 @@ pub(crate) use rest::Rest;
 
 use std::time::Duration;
 
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 use tck_base::clock::Moment;
+use tck_view::VisualizationView;
 
 use super::Agv;
 use super::hook_points::{Event, Part, Permission, Span};
@@ -101,7 +102,7 @@ impl Changes {
                 "lastNodeId" | "lastNodeSequenceId" => changes.node = true,
                 "operatingMode" => changes.mode = true,
                 "driving" => changes.driving = true,
-                "actionStates" => changes.actions = true,
+                "actionStates" | "instantActionStates" => changes.actions = true,
                 "maps" => changes.maps = true,
                 _ => changes.other = true,
             }
@@ -257,6 +258,12 @@ impl Agv {
             body.insert("agvPosition".into(), self.position_picture());
         }
         body.insert("velocity".into(), self.velocity_picture());
+        if !self.config.names.lacks(VisualizationView::reference_state_header_id) {
+            body.insert(
+                "referenceStateHeaderId".into(),
+                json!(self.connection.last_header_id("state")),
+            );
+        }
         self.says(Part::Visualization, &mut body);
         self.publish("visualization", body);
     }

@@ -38,11 +38,11 @@ impl Agv {
         let paused = self.holds.pause || self.holds.button || self.holds.emergency;
         set("paused", json!(paused));
         set("newBaseRequest", json!(self.order.base_runs_low()));
-        let actions = self.actions.iter();
-        set(
-            "actionStates",
-            actions.filter_map(|action| self.action_state(action)).collect(),
-        );
+        let apart = self.config.has("instantActionStates");
+        set("actionStates", self.listed(|action| !apart || action.of_order()));
+        if apart {
+            set("instantActionStates", self.listed(|action| !action.of_order()));
+        }
         set("batteryState", self.battery());
         set("operatingMode", json!(self.mode_literal()));
         set("errors", self.errors_picture());
@@ -53,11 +53,21 @@ impl Agv {
         state
     }
 
+    /// The states of these actions.
+    fn listed(&self, which: impl Fn(&Action) -> bool) -> Value {
+        let actions = self.actions.iter().filter(|action| which(*action));
+        actions.filter_map(|action| self.action_state(action)).collect()
+    }
+
     /// All active errors (STATE-MSG-16).
     fn errors_picture(&self) -> Value {
         let errors = self.errors.active.iter();
         errors
-            .filter_map(|error| self.said(Part::Error(error), error.picture()))
+            .filter_map(|error| {
+                let rule = self.config.error_rules.get(&error.error_type);
+                let level = rule.map_or("WARNING", |rule| rule.level.as_str());
+                self.said(Part::Error(error), error.picture(level))
+            })
             .collect()
     }
 
@@ -144,13 +154,15 @@ impl Agv {
             Mode::Manual => "MANUAL",
             Mode::Service => "SERVICE",
             Mode::Teachin => "TEACHIN",
+            Mode::Startup => "STARTUP",
+            Mode::Intervened => "INTERVENED",
         }
     }
 
     fn safety(&self) -> Value {
         let emergency_stop = if self.holds.emergency {
             "MANUAL"
-        } else if self.holds.field {
+        } else if self.holds.field && !self.config.has("stopsByHand") {
             "AUTOACK"
         } else {
             "NONE"

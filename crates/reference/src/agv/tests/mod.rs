@@ -7,6 +7,7 @@ mod driving;
 mod faulty;
 mod guesses;
 mod hostile;
+mod later;
 mod link;
 mod maps;
 mod orders;

@@ -5,6 +5,10 @@ use crate::agv::order_state::OrderState;
 use super::prelude::*;
 
 records! {
+    fault "cancels-whatever-order" ["ORD-CANCEL-25"] "Cancels the order that it has, whatever order cancelOrder names."
+        => forbidding(|_, what| matches!(what, Permission::LeaveOrder));
+    fault "named-order-not-cancelled" ["ORD-CANCEL-24"] "Takes a cancelOrder that names an order for one without an order."
+        => letting(|_, what| matches!(what, Permission::LeaveOrder));
     fault "cancel-drives-on" ["ORD-CANCEL-02"] "Drives its base to the end before it obeys cancelOrder."
         => allowing(|agv, what, usual| match what {
             Permission::DriveAgainst(Hindrance::Cancellation) => agv.order.cancel.is_some(),

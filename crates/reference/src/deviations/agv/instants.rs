@@ -88,6 +88,34 @@ records! {
         => batch(|agv, actions| if !actions.is_empty() { agv.errors.forget_refusals() });
     fault "acknowledges-on-instant-actions" ["TOPIC-15"] "The vehicle answers every instantActions message with an empty message of its own on the same topic."
         => batch(|agv, actions| if !actions.is_empty() { acknowledge(agv) });
+    fault "instant-actions-among-those-of-orders" ["IACT-STATE-03"] "It lists instant actions among the actions of its order, and leaves their own list empty."
+        => state(|_, m| if let Some(Value::Array(instant)) = m.get_mut("instantActionStates") {
+            let instant = std::mem::take(instant);
+            if let Some(Value::Array(all)) = m.get_mut("actionStates") {
+                all.extend(instant);
+            }
+        });
+    fault "instant-actions-gone-with-new-order" ["IACT-STATE-02", "IACT-STATE-01"] "A new order empties the list of instant actions that have ended."
+        => when(Event::Begun, |agv| agv.actions.retain(|action| action.of_order() || !action.status.is_terminal()));
+    fault "clearing-keeps-failed-instants" ["IACT-STATE-04"] "clearInstantActions removes what is FINISHED and leaves what is FAILED."
+        => instead(Effect::ClearInstantActions, |agv, _| {
+            agv.actions.retain(|action| action.of_order() || action.status != Status::Finished);
+            Some(Outcome::Done(None))
+        });
+    fault "clearing-takes-all-instants" ["IACT-STATE-05"] "clearInstantActions removes instant actions that are still running, too."
+        => instead(Effect::ClearInstantActions, |agv, own| {
+            let own = own.id();
+            agv.actions.retain(|action| action.of_order() || action.request.id == own);
+            Some(Outcome::Done(None))
+        });
+    fault "retry-is-a-word" ["RETRY-03"] "retry is FINISHED, and the action that it names goes on waiting."
+        => instead(Effect::Retry, |_, _| Some(Outcome::Done(None)));
+    fault "skip-retry-is-a-word" ["RETRY-04"] "skipRetry is FINISHED, and the action that it names goes on waiting."
+        => instead(Effect::SkipRetry, |_, _| Some(Outcome::Done(None)));
+    fault "retry-of-anything-finished" ["RETRY-05"] "retry of an action that waits for none is FINISHED." because "It breaks a recommendation only."
+        => after(Effect::Retry, |_, _, _| Outcome::Done(None));
+    fault "retriable-does-not-count" ["RETRY-07"] "It takes a new order while an action of the one before waits for a retry."
+        => forbidding(|_, what| matches!(what, Permission::Count(action) if action.status == Status::Retriable));
     fault "instant-action-deferred" ["IACT-05"] "Begins instant actions other than cancelOrder only when its order is complete."
         => deferring(|agv, action| agv.is_busy() && !is(action, Effect::CancelOrder));
     fault "instant-actions-wait-for-pause" ["IACT-05"] "While it is paused it holds back instant actions until the pause is lifted."

@@ -6,6 +6,23 @@ use crate::agv::order_state::OrderState;
 use super::prelude::*;
 
 records! {
+    fault "mode-told-at-once" ["ORD-CLEAR-05", "ORD-CLEAR-09"] "It breaks off everything at once when the mode changes, also what cannot be broken off."
+        => forbidding(|_, what| matches!(what, Permission::EndActions));
+    fault "place-kept-in-service" ["MODE-15"] "It goes on showing its last node in SERVICE and TEACH_IN."
+        => keep::<String>().happens(|kept, agv, event| match event {
+            Event::ModeChanging(_) => kept.clone_from(&agv.order.last_node),
+            Event::ModeChanged(_) if agv.order.last_node.is_empty() => agv.order.last_node.clone_from(kept),
+            _ => {}
+        });
+    fault "intervention-ends-order" ["MODE-07"] "It gives its order up when somebody steps in."
+        => when(Event::ModeChanging(Mode::Intervened), Agv::give_up_order);
+    fault "intervention-refuses-orders" ["MODE-10"] "It takes no orders and no updates while somebody steps in."
+        => objecting(|agv, _, relation| {
+            let refused = relation != Relation::Known && agv.mode == Mode::Intervened;
+            refused.then(|| Refusal::new(Rule::OtherOrderActive, "somebody has stepped in"))
+        });
+    fault "intervention-drives-on" ["MODE-10"] "It drives on while somebody steps in."
+        => drives(Hindrance::Mode, |agv| agv.mode == Mode::Intervened);
     fault "semiautomatic-refused" ["MODE-02"] "Refuses orders in SEMIAUTOMATIC."
         => objecting(|agv, _, relation| {
             let refused = relation != Relation::Known && agv.mode == Mode::Semiautomatic;

@@ -6,6 +6,13 @@ use crate::agv::order_message::Blocking;
 use super::prelude::*;
 
 records! {
+    fault "single-beside-others" ["BLOCK-08", "BLOCK-10"] "It runs SINGLE actions in parallel with the others of their list."
+        => plain().queues(|(), agv, _, phases| {
+            let single = |id: &String| agv.actions.get(id).is_some_and(|action| action.request.blocking == Blocking::Single);
+            if phases.iter().flatten().any(single) {
+                *phases = [phases.drain(..).flatten().collect()].into();
+            }
+        });
     fault "actions-held-offline" ["MQTT-04"] "As long as the link is broken it drives on but begins no action of its order."
         => forbidding(|agv, what| matches!(what, Permission::Act) && !agv.connection.online);
     fault "semiautomatic-actions-held" ["MODE-02"] "It does not begin the actions of its order in SEMIAUTOMATIC."

@@ -176,6 +176,8 @@ records! {
             Mode::Manual => "SERVICE",
             Mode::Service => "TEACHIN",
             Mode::Teachin => "SEMIAUTOMATIC",
+            Mode::Startup => "AUTOMATIC",
+            Mode::Intervened => "MANUAL",
         }));
 
     fault "safety-state-missing" ["STATE-MSG-01", "STATE-01"] "Leaves safetyState out of its states."

@@ -60,6 +60,13 @@ records! {
         => overlooking(|agv, what| matches!(what, Objection::Joint(first) if !runs(agv) && first.sequence_id == agv.order.last_sequence));
     fault "cancelled-order-revived" ["ORD-FLOW-10", "ORD-CANCEL-02", "ORD-CANCEL-11"] "Goes on with a cancelled order when an update of it comes late."
         => updating(|agv, _| revive(agv)).allows(|_, _, what, usual| usual || matches!(what, Permission::Overlook(Objection::Cancelled)));
+    fault "update-after-cancel-called-outdated" ["ORD-CANCEL-21"] "Reports an update of a cancelled order as an outdated one."
+        => refusal(|agv, _, _, e| {
+            if e.error_type == agv.config.errors.after_cancel {
+                e.error_type.clone_from(&agv.config.errors.outdated_update);
+            }
+            true
+        });
     fault "cancel-ended-by-update" ["ORD-CANCEL-11", "ORD-CANCEL-02", "ORD-CANCEL-06"] "Ends a cancellation that is under way when an update comes, and drives it."
         => updating(|agv, _| revive(agv)).allows(|_, agv, what, usual| usual || matches!(what, Permission::Overlook(Objection::Cancelled)) && agv.order.cancel.is_some());
     fault "only-first-update" ["ORD-FLOW-09", "ORD-06"] "Refuses every further update of an order that was updated before."
