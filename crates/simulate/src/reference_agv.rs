@@ -174,7 +174,7 @@ impl ReferenceAgv {
                 .filter(|(_, on)| *on)
                 .map(|(name, _)| name.to_owned())
                 .collect(),
-            nodes,
+            nodes: nodes.into(),
             chargers: BTreeSet::from([CHARGER.to_owned()]),
             stations: [SHELF, TAKEN_SHELF].map(|node| (node.to_owned(), true)).into(),
             // Six more fit, which tests rely on.

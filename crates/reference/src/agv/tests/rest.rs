@@ -43,7 +43,10 @@ fn happens(bench: &mut Bench, what: usize, number: usize) {
         8 => bench.command("release-emergency-stop", json!({})),
         9 => bench.command("place-on", json!({ "nodeId": "n4" })),
         10 => bench.command("move-to", json!({ "x": 0.01, "y": 0.0 })),
-        11 => bench.command("set-mode", json!({ "mode": ["MANUAL", "AUTOMATIC"][number % 2] })),
+        11 => {
+            let mode = ["MANUAL", "AUTOMATIC"][number % 2];
+            bench.command("set-mode", json!({ "mode": mode }));
+        }
         12 => bench.send_raw("order", "{"),
         13 => bench.command("place-load", json!({ "loadId": id, "loadType": "EPAL" })),
         14 => bench.command("set-battery", json!({ "charge": 12.5 })),
