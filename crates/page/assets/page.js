@@ -171,9 +171,9 @@ function recordButton(number, label) {
 
 function showFindings(findings) {
   show("no-findings", findings.length === 0);
-  const items = findings.map(({ requirement, verdict, by, message, record, count }) => {
+  const items = findings.map(({ requirement, verdict, by, message, record, count, asks }) => {
     const item = make("li");
-    item.append(make("span", verdict, verdict), ` ${requirement}: ${message} `);
+    item.append(make("span", verdict, verdict), ` ${requirement}: ${asks ? `${asks} Seen: ` : ""}${message} `);
     if (count > 1) item.append(`(${count} times) `);
     item.append(make("span", `– found by ${by} `));
     if (record !== undefined) item.append(recordButton(record, `message #${record}`));
@@ -239,7 +239,7 @@ function tick() {
   }
   const ends = seen.head && seen.head.ends;
   const goesOn = ends > now ? `About ${span(ends - now)} left, until ${clock(ends - ahead)}` : "It takes longer than was expected.";
-  if (seen.head) put("ends", ends ? goesOn : "");
+  if (seen.head) put("ends", seen.question ? "The run goes on when the question is answered." : ends ? goesOn : "");
   const isLost = !isOver && Date.now() - lastHeard > LOST_AFTER;
   show("lost", isLost || (source === null && !isOver));
   if (isLost && source && Date.now() > retryAt) {
