@@ -1,5 +1,6 @@
 //! `--page`: the page for the people beside the device, served while a run goes on (docs/page.md).
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -14,7 +15,7 @@ use tck_course::Layout;
 use tck_engine::{Onlooker, Watcher};
 use tck_journal::event::{Event, Gate, Plan};
 use tck_net::link::mqtt::BenchInfo;
-use tck_pack::{Pack, Role};
+use tck_pack::{Catalogue, Pack, Role};
 use tck_page::{
     Choice, Desk, Finding, Floor, FloorEdge, FloorNode, Page, PageError, PageServer, Planned, Prompt, RoutePart,
     StepFacts, TestFacts, VehicleOnFloor, Way,
@@ -256,6 +257,13 @@ fn on_floor(state: &StateView) -> VehicleOnFloor {
         nodes: nodes.collect(),
         edges: edges.collect(),
     }
+}
+
+/// What each requirement asks, in the words of the version that the run is about.
+pub(super) fn asks(catalogue: &Catalogue, pack: &Pack) -> BTreeMap<String, String> {
+    let all = catalogue.all();
+    all.map(|one| (one.id.as_str().to_owned(), one.edition(pack).text.clone()))
+        .collect()
 }
 
 /// A layout as the page draws it.

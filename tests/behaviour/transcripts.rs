@@ -180,6 +180,17 @@ fn a_failing_run_is_understood_and_reproduced() {
 }
 
 #[test]
+fn the_picture_of_the_course_shows_where_the_vehicle_went_wrong() {
+    replay("course.md", Bench::new().path());
+}
+
+/// What is pressed on the tablet is tried where the page is tested.
+#[test]
+fn a_run_that_is_led_from_a_tablet_is_prepared() {
+    replay("tablet.md", Bench::new().path());
+}
+
+#[test]
 fn a_pipeline_gates_on_known_failures() {
     replay("pipeline.md", Bench::new().path());
 }

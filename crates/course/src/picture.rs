@@ -23,7 +23,7 @@ const STYLE: &str = "\
 .course .edge { stroke: var(--muted, #57606a); stroke-width: 1.5; }
 .course .tip { fill: var(--muted, #57606a); }
 .course .base { stroke: var(--accent, #1f5f99); stroke-width: 9; stroke-opacity: .45; stroke-linecap: round; }
-.course .horizon { stroke: var(--accent, #1f5f99); stroke-width: 3; stroke-dasharray: 9 7; }
+.course .horizon { stroke: var(--accent, #1f5f99); stroke-width: 9; stroke-opacity: .45; stroke-dasharray: 14 10; }
 .course .trail { stroke: var(--ink, #1b1f24); stroke-width: 3.2; stroke-dasharray: .1 6; stroke-linecap: round; }
 .course .node { fill: var(--ink, #1b1f24); }
 .course .start { fill: var(--paper, #fff); stroke: var(--ink, #1b1f24); stroke-width: 2.5; }

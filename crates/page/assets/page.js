@@ -6,6 +6,8 @@ const secret = location.pathname.split("/")[1];
 const name = crypto.getRandomValues(new Uint32Array(2)).join("-");
 const LOST_AFTER = 15_000;
 const RETRY_AFTER = 2_000;
+// A second tap of a hasty finger is no answer to the next question, which stands at the same place.
+const CALM_FOR = 700;
 const seen = { head: null, test: null, question: null, tests: [], findings: [], floor: null, vehicle: null, fleet: null };
 let source = null;
 let lastHeard = 0;
@@ -13,6 +15,7 @@ let retryAt = 0;
 let ahead = 0;
 let isOver = false;
 let asked = 0;
+let askedAt = 0;
 let opener = null;
 
 const put = (id, text) => {
@@ -65,7 +68,7 @@ function showHead(head) {
     put("outcome-verdict", head.outcome.verdict);
     byId("outcome-verdict").className = head.outcome.verdict;
     put("outcome-statement", head.outcome.statement);
-    put("outcome-report", `Report: ${head.outcome.report}`);
+    put("outcome-report", `Report, on the machine of the harness: ${head.outcome.report}`);
   }
   title();
 }
@@ -75,17 +78,40 @@ function showTest(test) {
   if (!test) return;
   put("test-title", test.title);
   put("test-id", `${test.test} (${test.number} of ${test.of})`);
-  put("step", test.step ? test.step.title || test.step.does : "it begins");
+  put("step", test.step ? test.step.title || inWords(test.step.does) : "it begins");
+}
+
+// What a step without a title does, from the words of its suite, such as `expect: state`.
+function inWords(does) {
+  const [verb, what] = does.split(": ");
+  const words = {
+    send: "a message is sent",
+    expect: "a message is awaited",
+    never: "a message that must not come is looked out for",
+    always: "every message is looked at",
+    action: "an action is awaited",
+    operator: "something has to be done at the device",
+  };
+  return what && words[verb] ? `${words[verb]} (${what})` : does;
+}
+
+function letAnswer() {
+  const calm = askedAt + CALM_FOR - Date.now();
+  for (const id of ["done", "skip", "end"]) byId(id).disabled = calm > 0;
+  if (calm > 0) setTimeout(letAnswer, calm);
 }
 
 function showQuestion(question) {
   show("question", question !== null);
-  for (const id of ["done", "skip", "end"]) byId(id).disabled = false;
+  if (question && asked !== question.number) askedAt = Date.now();
+  letAnswer();
   put("question-said", "");
   if (!question) return title();
+  put("question-title", `Question ${question.number}: somebody has to do this`);
   put("question-text", question.text);
   put("question-test", [question.title, question.test].filter(Boolean).join(" – ") || "none");
-  put("question-step", question.step || "none");
+  for (const id of ["question-step", "question-step-name"]) show(id, question.step !== null);
+  put("question-step", question.step || "");
   put("question-why", question.why || "the test cannot go on without it");
   if (asked !== question.number) {
     asked = question.number;
@@ -145,11 +171,11 @@ function recordButton(number, label) {
 
 function showFindings(findings) {
   show("no-findings", findings.length === 0);
-  const items = findings.map(({ requirement, verdict, by, message, record, count }) => {
+  const items = findings.map(({ requirement, verdict, by, message, record, count, asks }) => {
     const item = make("li");
-    item.append(make("span", verdict, verdict), ` ${requirement}: ${message} `);
+    item.append(make("span", verdict, verdict), ` ${requirement}: ${asks ? `${asks} Seen: ` : ""}${message} `);
     if (count > 1) item.append(`(${count} times) `);
-    item.append(make("span", `by ${by} `));
+    item.append(make("span", `– found by ${by} `));
     if (record !== undefined) item.append(recordButton(record, `message #${record}`));
     return item;
   });
@@ -212,7 +238,8 @@ function tick() {
     put("waits", "");
   }
   const ends = seen.head && seen.head.ends;
-  if (seen.head) put("ends", ends ? `About ${span(ends - now)} left, until ${clock(ends - ahead)}` : "");
+  const goesOn = ends > now ? `About ${span(ends - now)} left, until ${clock(ends - ahead)}` : "It takes longer than was expected.";
+  if (seen.head) put("ends", seen.question ? "The run goes on when the question is answered." : ends ? goesOn : "");
   const isLost = !isOver && Date.now() - lastHeard > LOST_AFTER;
   show("lost", isLost || (source === null && !isOver));
   if (isLost && source && Date.now() > retryAt) {

@@ -1,6 +1,6 @@
 //! What the page shows: kept up to date while the run goes on, and told to each browser as far as that has not seen it.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -65,6 +65,8 @@ struct Model {
     question: Part<Option<Asked>>,
     tests: Part<Vec<Row>>,
     findings: Part<Vec<Finding>>,
+    /// What a requirement asks, by its id.
+    asks: BTreeMap<String, String>,
     floor: Part<Option<Floor>>,
     vehicle: Part<(VehicleOnFloor, Trail)>,
     fleet: Part<Fleet>,
@@ -107,6 +109,14 @@ impl Page {
                 finding.record = None;
             }
             model.head.touch(change).connections = None;
+        });
+    }
+
+    /// What each requirement asks, by its id: a finding is shown with it.
+    pub fn asks(&self, asks: BTreeMap<String, String>) {
+        self.change(|model, change| {
+            model.asks = asks;
+            model.findings.changed = change;
         });
     }
 
@@ -456,6 +466,15 @@ impl Model {
         }
     }
 
+    /// A finding as it is told. One of several requirements, which says why they are undecided, goes without their sentences.
+    fn with_what_is_asked(&self, finding: &Finding) -> Value {
+        let mut told = json!(finding);
+        if let Some(asks) = self.asks.get(&finding.requirement) {
+            told["asks"] = shown(asks, SENTENCE).into();
+        }
+        told
+    }
+
     fn count_connections(&mut self, entry: &Entry, change: u64) {
         let open = self.head.value.connections.unwrap_or(0);
         let (open, text) = match entry.event() {
@@ -490,7 +509,10 @@ impl Model {
         add("test", self.test.changed, &|| json!(self.test.value));
         add("question", self.question.changed, &|| json!(self.question.value));
         add("tests", self.tests.changed, &|| json!(self.tests.value));
-        add("findings", self.findings.changed, &|| json!(self.findings.value));
+        add("findings", self.findings.changed, &|| {
+            let findings = self.findings.value.iter();
+            findings.map(|finding| self.with_what_is_asked(finding)).collect()
+        });
         add("floor", self.floor.changed, &|| json!(self.floor.value));
         add("vehicle", self.vehicle.changed, &|| {
             let (vehicle, trail) = &self.vehicle.value;

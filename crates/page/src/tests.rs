@@ -337,6 +337,7 @@ async fn a_page_that_is_opened_late_or_twice_is_told_everything() {
     ]);
     let told = early.until(|told| told.get("findings").is_some()).await;
     assert_eq!(told["reset"], false);
+    page.asks([("STATE-02".to_owned(), "Say it.".to_owned())].into());
     let mut late = Browser::open(&server, "late").await;
     let all = late.next().await.unwrap();
     assert_eq!((&all["reset"], &all["head"]["phase"]), (&json!(true), &json!("runs")));
@@ -351,6 +352,8 @@ async fn a_page_that_is_opened_late_or_twice_is_told_everything() {
         (&json!("Press it."), &json!("A title"))
     );
     assert_eq!(all["findings"][0]["requirement"], "STATE-02", "the worst comes first");
+    assert_eq!(all["findings"][0]["asks"], "Say it.");
+    assert!(all["findings"][1].get("asks").is_none(), "nobody has said what it asks");
     assert_eq!(
         all["tests"],
         json!([{ "test": "a/b", "state": "runs" }, { "test": "c/d", "state": "left-out", "why": "it does not drive" }])

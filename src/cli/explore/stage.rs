@@ -156,6 +156,7 @@ impl OnStage {
         let Some(page) = self.page() else { return Ok(()) };
         self.desk.is_followed_by(page::follower(page.clone()));
         let subject = self.subject();
+        page.asks(page::asks(&self.library.rules.catalogue, &self.pack));
         page.begun(Facts {
             command: "explore".to_owned(),
             role: subject.role.word().to_owned(),

@@ -468,6 +468,7 @@ impl Job {
         run.stopped_at = self.desk.stopped_at();
         if let Some(page) = &self.page {
             let role = run.device.subject.role;
+            page.asks(page::asks(&self.library.rules.catalogue, &self.pack));
             run.onlooker = Some(page::onlooker(page.clone(), role, Arc::clone(&self.pack)));
             if let Some(layout) = run.device.layout.as_ref().filter(|_| role == Role::Agv) {
                 page.floor(page::floor(layout));
