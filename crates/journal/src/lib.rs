@@ -9,6 +9,7 @@ pub mod event;
 mod fault;
 pub mod file;
 pub mod json;
+mod latency;
 mod packet;
 mod payload;
 pub mod place;
@@ -28,6 +29,7 @@ use tck_view::{MessageView, Names, Topic};
 
 pub use event::{Direction, Event, Packet, Payload, Record, Source, Will};
 pub use json::Parsed;
+pub use latency::{Histogram, OwnLatency, Spread};
 pub use plan::tool;
 use read::Read;
 pub use reason::{OwnError, Reason};
