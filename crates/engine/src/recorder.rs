@@ -7,7 +7,7 @@ use tck_base::clock::{Moment, WallClock};
 use tck_journal::event::{Event, Occurrence, Packet};
 use tck_journal::file::JournalWriter;
 use tck_journal::{Entry, Histogram, Journal, Spread};
-use tck_judge::{JudgeError, Rules, RunJudge, judged};
+use tck_judge::{JudgeError, NAMED_VEHICLES, Rules, RunJudge, judged};
 
 /// Why something could not be recorded.
 #[derive(Debug, thiserror::Error)]
@@ -19,6 +19,9 @@ pub enum RecordError {
     #[error(transparent)]
     Judge(#[from] JudgeError),
 }
+
+/// What mock AGVs have said is kept as it was read for so many records; further back, its text is enough.
+const READ: usize = 1_000;
 
 /// Is shown every record once it is written and judged.
 pub type Onlooker = Box<dyn FnMut(&Arc<Entry>) + Send>;
@@ -59,6 +62,8 @@ pub struct Recorder {
     onlooker: Option<Onlooker>,
     /// None in virtual time.
     stopwatch: Option<Stopwatch>,
+    /// Whether there are more mock AGVs than tests talk about.
+    has_crowd: bool,
 }
 
 impl Recorder {
@@ -97,6 +102,7 @@ impl Recorder {
             leaves_out: false,
             onlooker: None,
             stopwatch: None,
+            has_crowd: matches!(entry.event(), Event::RunBegun { header } if header.vehicles.len() > NAMED_VEHICLES),
         })
     }
 
@@ -148,6 +154,9 @@ impl Recorder {
         }
         if let Some(stopwatch) = &mut self.stopwatch {
             stopwatch.note(&entry);
+        }
+        if self.has_crowd {
+            self.guard.let_go(self.journal.forget_reading(READ));
         }
         if let Some(onlooker) = &mut self.onlooker {
             onlooker(&entry);
