@@ -242,7 +242,7 @@ mod tests {
     fn cut(messages: &[Message], shard: Option<Shard>) -> AuditResult {
         let options = Options {
             shard,
-            cut: Some(std::time::Duration::from_secs(5)),
+            cut: Some(std::time::Duration::from_secs(2)),
             ..Options::default()
         };
         let mut audit = Audit::new(&tck_testing::library().rules, options).expect("options");
@@ -262,7 +262,7 @@ mod tests {
         let library = tck_testing::library();
         let pack = library.rules.packs.latest();
         let (none, one): (&[&str], &[&str]) = (&[], &["horizon-not-reported"]);
-        for (faults, verdict) in [(none, Verdict::Pass), (one, Verdict::Fail)] {
+        for (faults, fails, most) in [(none, false, 3), (one, true, 16)] {
             let messages = traffic(library, pack, Role::Agv, "order-acceptance/", faults);
             let whole = cut(&messages, None);
             let numbers: Vec<u64> = whole
@@ -276,8 +276,10 @@ mod tests {
                 "{numbers:?}"
             );
             assert_eq!((whole.count_vehicles(), whole.cuts()), (1, Some(numbers.len() - 1)));
-            assert_eq!(whole.verdict, Some(verdict), "{:#?}", restricted(&whole));
-            for of in 1..=16 {
+            // Nobody is accused by a cut, and what is wrong is found all the same.
+            assert_eq!(whole.verdict, audited(&messages, None).verdict);
+            assert_eq!(whole.verdict == Some(Verdict::Fail), fails);
+            for of in 1..=most {
                 let all: Vec<AuditPart> = (1..=of)
                     .map(|index| part(cut(&messages, Some(Shard { index, of })), index))
                     .collect();
