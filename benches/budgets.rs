@@ -169,6 +169,7 @@ fn exploration() -> Vec<Measured> {
         at_once: 4,
         trials: 0,
         budget: None,
+        part: None,
     };
     let drawn = explore.drawn(&explore.grammar, &mut Coverage::default());
     let stimuli: usize = drawn.iter().map(|(chain, _)| chain.stimuli().len()).sum();

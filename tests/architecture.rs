@@ -558,6 +558,7 @@ fn incoming_messages_stay_values() {
                     "audit/result.rs",
                     "audit/saved.rs",
                     "audit/time_line.rs",
+                    "audit/time_stretch.rs",
                     "qualify/decider.rs",
                     "qualify/saved.rs",
                 ]

@@ -8,6 +8,7 @@
 
 use std::sync::Arc;
 
+use vda5050_tck::journal::{Entry, Event, OwnLatency, Spread};
 use vda5050_tck::judge::Library;
 use vda5050_tck::judge::judge;
 use vda5050_tck::report::json;
@@ -146,4 +147,48 @@ fn nothing_that_comes_after_an_interruption_accuses_anybody() {
     // What was found before stands.
     let (all, before) = (given(&never, Verdict::Fail), given(&interrupted_at(3), Verdict::Fail));
     assert!(!before.is_empty() && before.len() < all.len(), "{before:?} of {all:?}");
+}
+
+#[test]
+fn a_harness_that_was_slower_than_its_shortest_time_limit_says_so_and_judges_nothing_else() {
+    let library = library();
+    let pack = library.rules.packs.latest();
+    let mut request = VirtualRun::of(&library, pack);
+    request
+        .tests
+        .retain(|test| test.id == "order-rejection/lower-update-id");
+    let live = run_silently(&library, pack, request).expect("a run");
+    assert_eq!(live.result.harness_latency, None, "nothing takes time in virtual time");
+    let measured = |worst_micros| {
+        let spread = |worst_micros| Spread {
+            count: 9,
+            median_micros: 20,
+            p99_micros: 90,
+            worst_micros,
+        };
+        let mut entries = live.recorder.journal().entries().to_vec();
+        let mut last = entries.pop().expect("a record").record.clone();
+        let Event::RunEnded { latency, .. } = &mut last.event else {
+            panic!("{last:?}");
+        };
+        *latency = OwnLatency::of(Some(spread(100)), Some(spread(worst_micros)));
+        entries.push(Entry::new(last));
+        judge(&library.rules, &entries).expect("judged")
+    };
+    let in_time = measured(1_000);
+    let worst = in_time
+        .harness_latency
+        .and_then(|latency| Some(latency.judged?.worst_micros));
+    assert_eq!((worst, &in_time.limits), (Some(1_000), &live.result.limits));
+    let late = measured(700_000_000);
+    let said: Vec<&String> = late
+        .limits
+        .iter()
+        .filter(|limit| !in_time.limits.contains(limit))
+        .collect();
+    assert!(
+        said.len() == 1 && said[0].starts_with("The harness itself took up to 700.0 s"),
+        "{said:?}"
+    );
+    assert_eq!((late.verdict, late.tests), (in_time.verdict, in_time.tests));
 }

@@ -33,6 +33,7 @@ pub fn audit(arguments: &Arguments) -> Result<Exit, Problem> {
         only: arguments.only.clone(),
         protocol: arguments.protocol.clone(),
         shard: part.as_ref().map(|part| part.shard),
+        cut: arguments.cut,
     };
     if arguments.follow {
         return super::follow::follow(arguments, &library, options);
@@ -204,7 +205,7 @@ fn shared(part: &ChosenShard, arguments: &Arguments, library: &Library) -> Shard
             (&arguments.time, &arguments.topic, &arguments.payload),
             (arguments.from, arguments.to, arguments.redact),
             (&arguments.vehicle, &arguments.only),
-            (&arguments.topic_template, &arguments.protocol),
+            (&arguments.topic_template, &arguments.protocol, arguments.cut),
         )
     );
     let record = ShardRecord::of(part, part.shard.of, &[library.rules.sha256.as_str(), asked.as_str()]);

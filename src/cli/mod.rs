@@ -16,6 +16,7 @@ mod events;
 pub mod exit;
 mod explained;
 mod explore;
+mod explored;
 mod export;
 mod follow;
 mod gate;

@@ -35,6 +35,7 @@ pub fn watch(arguments: &Arguments) -> Result<Exit, Problem> {
             only: arguments.only.clone(),
             protocol: None,
             shard: None,
+            cut: None,
         },
         record: arguments.record.clone().map(|path| (path, rotation)),
         metrics: arguments.metrics.clone(),

@@ -119,3 +119,31 @@ fn the_profile_of_a_run_is_run_again() {
     };
     assert_eq!(values(&once_more), values(&written));
 }
+
+#[test]
+fn a_run_says_how_long_the_harness_took_itself() {
+    let bench = Bench::new();
+    bench
+        .run(&["run", QUICK])
+        .code(0)
+        .prints("harness       messages passed on in ");
+    let result = bench.result();
+    for what in ["passedOn", "judged"] {
+        let spread = &result["harness_latency"][what];
+        let micros = |name: &str| spread[name].as_u64().unwrap();
+        assert!(spread["count"].as_u64().unwrap() > 1, "{spread}");
+        assert!(
+            micros("medianMicros") <= micros("p99Micros") && micros("p99Micros") <= micros("worstMicros"),
+            "{spread}"
+        );
+        // Half a minute would be no measurement of this machine any more, but a mistake.
+        assert!(micros("worstMicros") < 30_000_000, "{spread}");
+    }
+    let bundle = bench.bundle();
+    let page = fs::read_to_string(bundle.join("report.html")).unwrap();
+    assert!(page.contains("How long the harness took itself"));
+    bench
+        .run(&["report", &bundle.display().to_string(), "--rejudge"])
+        .code(0)
+        .prints("byte for byte");
+}

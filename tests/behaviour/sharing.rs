@@ -1,4 +1,4 @@
-//! Parts of a run, an audit and a qualification, and what is joined from them.
+//! Parts of a run, an audit, a qualification and an exploration, and what is joined from them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -390,4 +390,65 @@ fn parts_of_an_audit_and_of_a_qualification_are_joined() {
         .run(&["report", "--merge", "proof/parts", "audits/parts", "--out", "mixed"])
         .code(2)
         .says("not of one kind");
+}
+
+#[test]
+fn an_exploration_is_divided_and_joined_and_a_part_that_is_missing_is_named() {
+    let bench = Bench::new();
+    let part = |shard: &str, code: i32| {
+        let fixed = [
+            "explore",
+            "--virtual",
+            "--seed",
+            "7",
+            "--conversations",
+            "4",
+            "--focus",
+            "outdated",
+        ];
+        let more = [
+            "--shrink-budget",
+            "4",
+            "--fault",
+            "outdated-update-taken-over",
+            "--out",
+            "parts",
+            "--shard",
+            shard,
+        ];
+        bench.run(&[&fixed[..], &more[..]].concat()).code(code)
+    };
+    part("1/2", 1).says("part 1 of 2 is done here");
+    bench
+        .run(&["report", "--merge", "parts", "--out", "half"])
+        .code(1)
+        .prints("not the whole: part 2 of 2 is missing");
+    part("2/2", 1);
+    part("5/5", 4);
+    bench
+        .run(&["report", "--merge", "parts", "--out", "whole"])
+        .code(1)
+        .prints("FAIL ORD-REJ-10");
+    let whole = read(&bench.path().join("whole/result.json"));
+    let parts = ["exploration-7-1-of-2", "exploration-7-2-of-2"];
+    let parts = parts.map(|name| read(&bench.path().join("parts").join(name).join("result.json")));
+    let sum = |member: &str| parts.iter().filter_map(|part| part[member].as_u64()).sum::<u64>();
+    assert_eq!((whole["planned"].as_u64(), sum("planned")), (Some(4), 4));
+    for member in ["conversations", "stimuli", "undecided"] {
+        assert_eq!(whole[member].as_u64(), Some(sum(member)), "{member}");
+    }
+    assert!(list(&whole["merged"], "troubles").is_empty(), "{}", whole["merged"]);
+    let found = list(&whole, "findings");
+    assert!(
+        found.iter().any(|one| word(one, "requirement") == "ORD-REJ-10"),
+        "{whole}"
+    );
+    let test = bench.path().join("whole/tests/ord-rej-10.yaml");
+    assert!(fs::read_to_string(test).unwrap().starts_with("test: explore/"));
+    bench
+        .run(&["report", "--merge", "half", "parts", "--out", "again"])
+        .code(1);
+    let again = read(&bench.path().join("again/result.json"));
+    assert_eq!(again["findings"], whole["findings"]);
+    bench.run(&["report", "--verify", "whole"]).code(0);
 }

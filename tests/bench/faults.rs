@@ -162,3 +162,33 @@ async fn refuse_leaves_the_present_connection_alone() {
     rig.device().await;
     rig.link.stop().await;
 }
+
+#[tokio::test]
+async fn only_what_the_harness_itself_takes_with_a_message_counts_as_its_own_time() {
+    let mut rig = rig().await;
+    let device = rig.device().await;
+    assert_eq!(rig.link.time_to_pass_on(), None, "a CONNECT is no message");
+    device.send("d/state", "at once", 1, false);
+    rig.until("state", |o| is_message(o, "at once")).await;
+    let before = rig.link.time_to_pass_on().unwrap();
+    // To the harness it goes past the tap, to the device through it.
+    assert_eq!(before.count, 1, "{before:?}");
+    rig.fault(LinkFault::Delay {
+        millis: 300,
+        direction: Some(Direction::FromDevice),
+    })
+    .await;
+    device.send("d/state", "held back", 0, false);
+    rig.until("state", |o| is_message(o, "held back")).await;
+    rig.fault(LinkFault::Silence { direction: None }).await;
+    device.send("d/state", "kept", 0, false);
+    rig.during(100).await;
+    rig.fault(LinkFault::Restore).await;
+    rig.until("state", |o| is_message(o, "kept")).await;
+    assert_eq!(rig.link.time_to_pass_on(), Some(before));
+    device.send("d/state", "at once again", 0, false);
+    rig.until("state", |o| is_message(o, "at once again")).await;
+    let after = rig.link.time_to_pass_on().unwrap();
+    assert_eq!(after.count, 2, "{after:?}");
+    rig.link.stop().await;
+}

@@ -45,6 +45,7 @@ fn found(one: &Explored, conversations: usize) -> Vec<Finding> {
         at_once: 4,
         trials: 0,
         budget: None,
+        part: None,
     };
     let drawn = exploration.drawn(&exploration.grammar, &mut Coverage::default());
     crate::found(&mut library, one.role, &drawn, |run| {

@@ -74,6 +74,7 @@ fn shrunk(known: &Known, library: &mut Library) -> Result<Chain, String> {
         length: 10,
         trials: TRIALS,
         budget: None,
+        part: None,
     };
     let mut drawn = exploration.drawn(&focused, &mut Coverage::default());
     drawn.retain(|(chain, _)| holds(chain.stimuli(), &known.stimuli));

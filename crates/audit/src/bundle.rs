@@ -388,7 +388,7 @@ fn html(result: &AuditResult, rules: &Rules) -> askama::Result<String> {
             let why = vehicle.sides.iter().find_map(|side| side.not_judged.as_ref());
             let why = vehicle.not_judged.as_ref().or(why);
             let why = why.map(|why| format!(" (not judged: {why})")).unwrap_or_default();
-            format!("{} {}{why}", vehicle.manufacturer, vehicle.serial_number)
+            format!("{} {}{why}", vehicle.manufacturer, vehicle.called())
         });
     let mut vehicles = Vec::new();
     let mut drawn = 0;

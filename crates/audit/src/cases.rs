@@ -9,13 +9,11 @@ use tck_report::junit::Plain;
 /// A side of a vehicle, for people.
 pub(super) fn named(vehicle: &VehicleResult, side: &SideResult) -> String {
     let VehicleResult {
-        manufacturer,
-        serial_number,
-        protocol,
-        ..
+        manufacturer, protocol, ..
     } = vehicle;
+    let called = vehicle.called();
     let version = protocol.as_deref().unwrap_or("unknown");
-    format!("{manufacturer} {serial_number}, {} ({version})", side.role)
+    format!("{manufacturer} {called}, {} ({version})", side.role)
 }
 
 /// A case for each requirement that was decided, by vehicle and side.

@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 
 use super::result::{AuditResult, VehicleResult};
+use super::stretched::lost;
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_journal::event::ShardRecord;
 use tck_result::{MergedBundle, MergedParts, Part, gathered};
@@ -60,7 +61,10 @@ pub fn join(parts: &[AuditPart]) -> Option<AuditResult> {
         }
     }
     // As an audit orders them: those of recordings by their topics, then those of runs.
-    vehicles.sort_by_key(|vehicle| (!vehicle.topics.contains("{topic}"), vehicle.topics.clone()));
+    vehicles.sort_by(|one, other| {
+        let order = |vehicle: &VehicleResult| !vehicle.topics.contains("{topic}");
+        (order(one), one.in_order()).cmp(&(order(other), other.in_order()))
+    });
     let judged = |result: &AuditResult| result.messages.saturating_sub(result.elsewhere + result.others);
     let judged: u64 = own.iter().map(|part| judged(&part.result)).sum();
     let merged = MergedParts {
@@ -103,9 +107,12 @@ pub(super) fn restricted(result: &AuditResult) -> Vec<(&'static str, Verdict, St
         let text = shard.limit(super::page::VEHICLES);
         ("it is one part of several", Verdict::Pass, text)
     });
+    let cut = result
+        .cuts()
+        .map(|cuts| ("its time was cut", Verdict::Pass, lost(cuts)));
     let troubles = result.merged.iter().flat_map(|merged| &merged.troubles);
     let troubles = troubles.map(|trouble| ("every part is there", Verdict::Inconclusive, format!("{trouble}.")));
-    is_part.into_iter().chain(troubles).collect()
+    is_part.into_iter().chain(cut).chain(troubles).collect()
 }
 
 #[cfg(test)]
@@ -229,6 +236,80 @@ mod tests {
         twice.push(part(all[0].result.clone(), 99));
         assert_eq!(kinds(&join(&twice).expect("parts")), [TroubleKind::Duplicate]);
         assert_eq!(join(&[part(audited(&messages, None), 1)]), None);
+    }
+
+    /// The time of one vehicle, cut wherever it may be.
+    fn cut(messages: &[Message], shard: Option<Shard>) -> AuditResult {
+        let options = Options {
+            shard,
+            cut: Some(std::time::Duration::from_secs(2)),
+            ..Options::default()
+        };
+        let mut audit = Audit::new(&tck_testing::library().rules, options).expect("options");
+        for message in messages {
+            audit.observe(message.clone());
+        }
+        let mut result = audit.finish(Vec::new());
+        result.shard = shard.map(|shard| {
+            let origin = "--shard".to_owned();
+            ShardRecord::of(&ChosenShard { shard, origin }, shard.of, &["suites"])
+        });
+        result
+    }
+
+    #[test]
+    fn one_to_sixteen_parts_of_the_time_of_one_vehicle_are_that_time() {
+        let library = tck_testing::library();
+        let pack = library.rules.packs.latest();
+        let (none, one): (&[&str], &[&str]) = (&[], &["horizon-not-reported"]);
+        for (faults, fails, most) in [(none, false, 3), (one, true, 16)] {
+            let messages = traffic(library, pack, Role::Agv, "order-acceptance/", faults);
+            let whole = cut(&messages, None);
+            let numbers: Vec<u64> = whole
+                .vehicles
+                .iter()
+                .filter_map(|vehicle| vehicle.stretch.as_ref())
+                .map(|stretch| stretch.number)
+                .collect();
+            assert!(
+                numbers.len() > 4 && numbers == (1..=numbers.len() as u64).collect::<Vec<u64>>(),
+                "{numbers:?}"
+            );
+            assert_eq!((whole.count_vehicles(), whole.cuts()), (1, Some(numbers.len() - 1)));
+            // Nobody is accused by a cut, and what is wrong is found all the same.
+            assert_eq!(whole.verdict, audited(&messages, None).verdict);
+            assert_eq!(whole.verdict == Some(Verdict::Fail), fails);
+            for of in 1..=most {
+                let all: Vec<AuditPart> = (1..=of)
+                    .map(|index| part(cut(&messages, Some(Shard { index, of })), index))
+                    .collect();
+                let mut joined = join(&all).expect("parts");
+                let merged = joined.merged.take().expect("merged");
+                assert!(merged.troubles.is_empty(), "{of}: {:?}", merged.troubles);
+                assert_eq!(joined, whole, "{of} parts");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_lost_by_a_cut_is_said() {
+        let library = tck_testing::library();
+        let messages = traffic(
+            library,
+            library.rules.packs.latest(),
+            Role::Agv,
+            "order-acceptance/",
+            &[],
+        );
+        let said = |result: &AuditResult| {
+            let all = restricted(result).into_iter().map(|(_, _, sentence)| sentence);
+            all.filter(|sentence| sentence.starts_with("Time was cut")).count()
+        };
+        assert_eq!(said(&cut(&messages, None)), 1);
+        assert_eq!(said(&audited(&messages, None)), 0);
+        let stretch = &cut(&messages, None).vehicles[1];
+        assert!(stretch.called().contains("(stretch 2, from "), "{}", stretch.called());
+        assert!(stretch.retained > 0, "what a broker has stored goes along");
     }
 
     static THIRDS: LazyLock<Vec<AuditPart>> = LazyLock::new(|| parts(&site(), 3));

@@ -15,6 +15,7 @@ mod continuity;
 mod conversation;
 mod courses;
 mod covered;
+mod cut;
 mod dedup;
 pub mod export;
 mod finding_group;
@@ -37,12 +38,15 @@ pub mod saved;
 mod side;
 pub mod slice;
 mod span;
+mod stretched;
 pub mod time_line;
+pub mod time_stretch;
 mod topics;
 mod vehicle;
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
+use std::time::Duration;
 
 use tck_base::shard::{Shard, dealt};
 use tck_capture::{Message, SourcePosition, Told, Wire, WireEvent};
@@ -51,6 +55,7 @@ use tck_judge::Rules;
 use tck_suite::model::Monitor;
 use tck_view::Topic;
 
+use cut::{Cutter, Place};
 pub use hint::{Hint, Hints};
 pub use message_check::{Flaw, single};
 use misnamed::Misnamed;
@@ -58,7 +63,7 @@ use mqtt_sessions::{MqttSessions, Publisher};
 pub use new_findings::{Address, Found};
 pub use own_run::{OwnRunError, own_run};
 pub use redact::Redactor;
-use result::{AuditResult, RESULT_FORMAT, Recording, Whence};
+use result::{AuditResult, RESULT_FORMAT, Recording, VehicleResult, Whence};
 use topics::{Beside, Named, Topics};
 use vehicle::Vehicle;
 
@@ -76,8 +81,10 @@ pub struct Options {
     pub only: Vec<String>,
     /// The protocol version all are judged by, whatever their messages say.
     pub protocol: Option<String>,
-    /// Only this part of the vehicles, where several processes share them.
+    /// Only this part of the vehicles, or of the stretches of time into which they are cut, where several processes share them.
     pub shard: Option<Shard>,
+    /// How long the stretches are at least into which each vehicle is cut where it is at rest; not at all unless said.
+    pub cut: Option<Duration>,
 }
 
 impl Options {
@@ -92,10 +99,26 @@ impl Options {
     }
 
     /// Whether a vehicle belongs to the part that is judged here. A recording does not say beforehand which vehicles it holds, so
-    /// that they are dealt out by their names.
+    /// that they are dealt out by their names. Where time is cut, every part has stretches of each.
     #[must_use]
     pub fn does(&self, manufacturer: &str, serial_number: &str) -> bool {
         let dealt = |shard| dealt(&format!("{manufacturer}/{serial_number}"), shard);
+        self.cut.is_some() || self.shard.is_none_or(dealt)
+    }
+
+    /// Whether a stretch of time of a vehicle belongs to the part that is judged here.
+    fn does_stretch(&self, vehicle: &Named, place: &Place) -> bool {
+        let Named {
+            manufacturer,
+            serial_number,
+            ..
+        } = vehicle;
+        let dealt = |shard| {
+            dealt(
+                &format!("{manufacturer}/{serial_number}/{}", place.stretch.number),
+                shard,
+            )
+        };
         self.shard.is_none_or(dealt)
     }
 
@@ -123,6 +146,9 @@ pub enum AuditError {
     /// No monitor is left.
     #[error("no monitor is called `{0}`, and none decides a requirement of that name")]
     NoMonitor(String),
+    /// Connections go on over a cut in time.
+    #[error("a recording of packets is not cut in time: its connections are judged as they are, from their beginning")]
+    Packets,
     /// There are no rules for the version.
     #[error("version {version} is not known to this program ({known})")]
     Protocol {
@@ -156,6 +182,10 @@ pub struct Audit<'r> {
     options: Options,
     topics: Topics,
     vehicles: BTreeMap<String, Vehicle>,
+    /// Cuts the time of each vehicle, where that is asked for.
+    cutter: Option<Cutter>,
+    /// What came out of stretches that are over.
+    ended: Vec<VehicleResult>,
     wires: MqttSessions,
     messages: u64,
     elsewhere: u64,
@@ -201,6 +231,8 @@ impl<'r> Audit<'r> {
         Ok(Self {
             topics: Topics::new(&rules.packs, options.topic_template.as_deref())?,
             rules,
+            cutter: options.cut.map(Cutter::new),
+            ended: Vec::new(),
             options,
             vehicles: BTreeMap::new(),
             wires: MqttSessions::default(),
@@ -282,6 +314,17 @@ impl<'r> Audit<'r> {
             self.others += 1;
             return;
         }
+        let cutter = self.cutter.as_mut();
+        let cut = cutter.map(|cutter| cutter.place(&named, number, &message, self.rules));
+        if let Some(place) = &cut {
+            if place.begins {
+                self.end_stretch(&named.key);
+            }
+            if !self.options.does_stretch(&named, place) {
+                self.others += 1;
+                return;
+            }
+        }
         let place: SourcePosition = message.place;
         self.places.note(self.messages, place);
         if !self.vehicles.contains_key(&named.key) {
@@ -289,8 +332,13 @@ impl<'r> Audit<'r> {
                 self.beyond += 1;
                 return;
             }
-            self.vehicles
-                .insert(named.key.clone(), Vehicle::new(&named, message.at.is_some()));
+            let is_behind_a_cut = cut.as_ref().is_some_and(|place| place.begins);
+            let stretch = cut.map(|place| place.stretch);
+            let vehicle = Vehicle::new(&named, message.at.is_some(), stretch);
+            self.vehicles.insert(named.key.clone(), vehicle);
+            if is_behind_a_cut {
+                self.show_stored(&named.key, message.at);
+            }
         }
         if let Some(vehicle) = self.vehicles.get_mut(&named.key) {
             let scene = AuditContext {
@@ -311,6 +359,40 @@ impl<'r> Audit<'r> {
         }
     }
 
+    /// The stretch of a vehicle is over.
+    fn end_stretch(&mut self, key: &str) {
+        let Some(vehicle) = self.vehicles.remove(key) else {
+            return;
+        };
+        let scene = AuditContext {
+            rules: self.rules,
+            options: &self.options,
+            places: &self.places,
+            hints: &self.hints,
+            live: self.live,
+        };
+        let ended = vehicle.finish(scene);
+        self.ended.extend(ended);
+    }
+
+    /// Shows the stretch of a vehicle that begins now what a broker has stored of it.
+    fn show_stored(&mut self, key: &str, now: Option<jiff::Timestamp>) {
+        let stored = self.cutter.iter().flat_map(|cutter| cutter.stored(key, now));
+        let Some(vehicle) = self.vehicles.get_mut(key) else {
+            return;
+        };
+        let scene = AuditContext {
+            rules: self.rules,
+            options: &self.options,
+            places: &self.places,
+            hints: &self.hints,
+            live: self.live,
+        };
+        for (number, name, message) in stored {
+            vehicle.observe(number, &name, message, scene);
+        }
+    }
+
     /// Whether a topic is of a vehicle that is wanted, or meant to be.
     #[must_use]
     pub fn concerns(&self, topic: &str) -> bool {
@@ -324,6 +406,10 @@ impl<'r> Audit<'r> {
     /// A message on a topic of no vehicle.
     fn stray(&mut self, number: u64, message: &Message) {
         self.elsewhere += 1;
+        // It belongs to no stretch, and each part would find it.
+        if self.options.cut.is_some() {
+            return;
+        }
         let wanted = |beside: &Beside| {
             let (maker, number) = (&beside.manufacturer, &beside.serial_number);
             self.options.wants_vehicle(maker, number) && self.options.does(maker, number)
@@ -413,11 +499,11 @@ impl<'r> Audit<'r> {
             vehicle.ready(scene);
         }
         self.wires.finish(&mut self.vehicles, scene);
-        let vehicles: Vec<_> = self
-            .vehicles
-            .into_values()
-            .flat_map(|vehicle| vehicle.finish(scene))
-            .collect();
+        let last = self.vehicles.into_values().flat_map(|vehicle| vehicle.finish(scene));
+        let mut vehicles: Vec<VehicleResult> = self.ended.into_iter().chain(last).collect();
+        if self.options.cut.is_some() {
+            vehicles.sort_by(|one, other| one.in_order().cmp(&other.in_order()));
+        }
         let mut result = AuditResult {
             format: RESULT_FORMAT.to_owned(),
             tool: tck_journal::tool(),

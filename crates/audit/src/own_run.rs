@@ -97,6 +97,7 @@ pub fn own_run(
         manufacturer: header.manufacturer,
         serial_number: header.serial_number,
         protocol: Some(header.protocol),
+        stretch: None,
         not_judged: None,
         messages,
         holes: 0,

@@ -66,11 +66,11 @@ pub fn page(result: &AuditResult) -> String {
         );
     }
     if result.others > 0 {
-        let _ = writeln!(
-            text,
-            "{} of vehicles that other parts judge",
-            counted(result.others, "message")
-        );
+        let of = if result.cuts().is_some() { "" } else { " of vehicles" };
+        let _ = writeln!(text, "{}{of} that other parts judge", counted(result.others, "message"));
+    }
+    if let Some(cuts) = result.cuts() {
+        let _ = writeln!(text, "{}", super::stretched::lost(cuts));
     }
     for trouble in result.merged.iter().flat_map(|merged| &merged.troubles) {
         let _ = writeln!(text, "not the whole: {}", line(&trouble.text));
@@ -109,7 +109,7 @@ fn conclusion(result: &AuditResult) -> String {
             .filter(|mistake| mistake.worst.verdict == verdict)
             .count()
     };
-    let vehicles = many(result.vehicles.len(), "vehicle");
+    let vehicles = many(result.count_vehicles(), "vehicle");
     match result.verdict {
         None if result.vehicles.is_empty() => "No message of VDA 5050 was found.".to_owned(),
         None => format!("{vehicles}; nothing could be judged."),
@@ -128,7 +128,7 @@ fn of_vehicle(vehicle: &VehicleResult, result: &AuditResult) -> String {
         text,
         "{} {} · VDA 5050 {version} · {}",
         line(&vehicle.manufacturer),
-        line(&vehicle.serial_number),
+        line(&vehicle.called()),
         line(&vehicle.topics)
     );
     let topics: Vec<String> = vehicle

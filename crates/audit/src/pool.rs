@@ -52,6 +52,8 @@ pub struct WorkerPool<'r> {
     /// Reads topics, and counts what is of no vehicle.
     desk: Audit<'r>,
     hands: Vec<Worker>,
+    /// Packets were recorded, though time is to be cut.
+    has_packets: bool,
 }
 
 impl WorkerPool<'_> {
@@ -71,6 +73,7 @@ impl WorkerPool<'_> {
     pub fn take(&mut self, told: Told) {
         match told {
             Told::Message(message) => self.message(message),
+            Told::Wire(_) if self.desk.options.cut.is_some() => self.has_packets = true,
             Told::Wire(wire) => {
                 let number = self.desk.messages + 1;
                 let owner = match &wire.event {
@@ -141,13 +144,24 @@ pub fn judged<E: From<AuditError>>(
             hands.push(Worker { jobs, batch });
             working.push(scope.spawn(move || work(rules, options, &inbox)));
         }
-        let mut crew = WorkerPool { desk, hands };
+        let mut crew = WorkerPool {
+            desk,
+            hands,
+            has_packets: false,
+        };
         let recordings = feed(&mut crew);
         for hand in &mut crew.hands {
             hand.pass();
         }
-        let WorkerPool { mut desk, hands } = crew;
+        let WorkerPool {
+            mut desk,
+            hands,
+            has_packets,
+        } = crew;
         drop(hands);
+        if has_packets {
+            return Err(AuditError::Packets.into());
+        }
         let misnamed = std::mem::take(&mut desk.misnamed);
         let mut result = desk.finish(Vec::new());
         for hand in working {
@@ -155,6 +169,7 @@ pub fn judged<E: From<AuditError>>(
                 Ok(part) => {
                     let part = part?;
                     result.beyond += part.beyond;
+                    result.others += part.others;
                     result.vehicles.extend(part.vehicles);
                 }
                 Err(panic) => std::panic::resume_unwind(panic),
@@ -162,7 +177,9 @@ pub fn judged<E: From<AuditError>>(
         }
         result.recordings = recordings?;
         // The versions of a vehicle stay in their order.
-        result.vehicles.sort_by(|one, other| one.topics.cmp(&other.topics));
+        result
+            .vehicles
+            .sort_by(|one, other| one.in_order().cmp(&other.in_order()));
         misnamed.tell(&mut result, rules, options);
         result.conclude();
         Ok(result)
@@ -222,5 +239,25 @@ mod tests {
         let mut wanted = single;
         wanted.vehicles.sort_by(|one, other| one.topics.cmp(&other.topics));
         assert_eq!(crew, wanted);
+    }
+
+    #[test]
+    fn a_recording_of_packets_is_not_cut_in_time() {
+        let library = tck_testing::library();
+        let options = Options {
+            cut: Some(std::time::Duration::from_secs(60)),
+            ..Options::default()
+        };
+        let wire = Wire {
+            at: None,
+            connection: 1,
+            certain: true,
+            event: WireEvent::Gap { sent: true },
+        };
+        let judged = judged::<AuditError>(&library.rules, &options, |crew| {
+            crew.take(Told::Wire(wire));
+            Ok(Vec::new())
+        });
+        assert_eq!(judged, Err(AuditError::Packets));
     }
 }

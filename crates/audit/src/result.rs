@@ -7,6 +7,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::time_line::TimeLine;
+use super::time_stretch::TimeStretch;
 use tck_base::verdict::{Accumulated, Verdict};
 use tck_capture::{Counted, SourcePosition};
 use tck_journal::event::ShardRecord;
@@ -155,6 +156,9 @@ pub struct VehicleResult {
     pub topics: String,
     /// Protocol version it is judged by.
     pub protocol: Option<String>,
+    /// Which stretch of its time it is, where time was cut.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stretch: Option<TimeStretch>,
     /// Why it is not judged.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub not_judged: Option<String>,

@@ -32,6 +32,7 @@ fn commanding(serial: &str, found: Vec<FindingResult>) -> VehicleResult {
         serial_number: serial.to_owned(),
         topics: String::new(),
         protocol: None,
+        stretch: None,
         not_judged: None,
         messages: BTreeMap::new(),
         holes: 0,

@@ -18,6 +18,7 @@ use super::outcome::Outcome;
 use super::result::{HintResult, VehicleResult, Whereabouts};
 use super::side::Side;
 use super::time_line::TimeLine;
+use super::time_stretch::TimeStretch;
 use super::topics::Named;
 use super::{AuditContext, is_command};
 use tck_base::clock::{Moment, Stamp};
@@ -56,6 +57,7 @@ fn is_fresh(message: &Message) -> bool {
 pub(super) struct Vehicle {
     named: Named,
     timed: bool,
+    stretch: Option<TimeStretch>,
     manufacturer: String,
     serial_number: String,
     origin: Option<jiff::Timestamp>,
@@ -87,8 +89,9 @@ pub(super) struct Vehicle {
 }
 
 impl Vehicle {
-    pub fn new(named: &Named, timed: bool) -> Self {
+    pub fn new(named: &Named, timed: bool, stretch: Option<TimeStretch>) -> Self {
         Self {
+            stretch,
             manufacturer: named.manufacturer.clone(),
             serial_number: named.serial_number.clone(),
             named: named.clone(),
@@ -473,6 +476,7 @@ impl Vehicle {
                 .next()
                 .unwrap_or_default(),
             protocol,
+            stretch: self.stretch.clone(),
             not_judged,
             messages: std::mem::take(&mut self.counts),
             holes,

@@ -142,6 +142,14 @@ impl TimeLimits {
         has_own.then(|| Self::of_bindings(&bindings))
     }
 
+    /// The shortest time within which the device has to do anything; none that is nothing.
+    #[must_use]
+    pub fn shortest(&self) -> Duration {
+        let all = self.named().into_iter();
+        let deadlines = all.filter(|(_, limit, loosened)| *loosened == Loosened::ByLonger && !limit.is_zero());
+        deadlines.map(|(_, limit, _)| limit).min().unwrap_or(self.react)
+    }
+
     /// The names a suite may use after `time.`.
     #[must_use]
     pub fn names() -> Vec<&'static str> {
@@ -252,6 +260,16 @@ pub fn show(duration: Duration) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_shortest_time_is_one_that_the_device_has_to_keep() {
+        let mut limits = TimeLimits::default();
+        assert_eq!(limits.shortest(), limits.event);
+        limits.settle = Duration::from_millis(1);
+        limits.notice = Duration::ZERO;
+        limits.event = Duration::from_secs(9);
+        assert_eq!(limits.shortest(), limits.slow);
+    }
 
     #[test]
     fn durations_are_read_in_three_units() {

@@ -121,6 +121,11 @@ impl FloodGuard {
         }
     }
 
+    /// So many bytes are not held any more.
+    pub fn let_go(&mut self, bytes: u64) {
+        self.held = self.held.saturating_sub(bytes);
+    }
+
     fn ends(&mut self, why: String, may_pass: bool) {
         self.over.get_or_insert(Over { why, may_pass });
     }

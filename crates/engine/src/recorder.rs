@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use super::flood::FloodGuard;
-use tck_journal::event::{Event, Occurrence};
+use tck_base::clock::{Moment, WallClock};
+use tck_journal::event::{Event, Occurrence, Packet};
 use tck_journal::file::JournalWriter;
-use tck_journal::{Entry, Journal};
-use tck_judge::{JudgeError, Rules, RunJudge, judged};
+use tck_journal::{Entry, Histogram, Journal, Spread};
+use tck_judge::{JudgeError, NAMED_VEHICLES, Rules, RunJudge, judged};
 
 /// Why something could not be recorded.
 #[derive(Debug, thiserror::Error)]
@@ -19,8 +20,36 @@ pub enum RecordError {
     Judge(#[from] JudgeError),
 }
 
+/// What mock AGVs have said is kept as it was read for so many records; further back, its text is enough.
+const READ: usize = 1_000;
+
 /// Is shown every record once it is written and judged.
 pub type Onlooker = Box<dyn FnMut(&Arc<Entry>) + Send>;
+
+/// Measures how long messages wait until they are recorded and judged.
+struct Stopwatch {
+    clock: WallClock,
+    /// What came before waited for the harness to begin.
+    since: Moment,
+    taken: Histogram,
+}
+
+impl Stopwatch {
+    fn note(&mut self, entry: &Entry) {
+        let came = entry.at().moment;
+        let is_message = matches!(
+            entry.event(),
+            Event::Message { .. }
+                | Event::Packet {
+                    packet: Packet::Publish { .. },
+                    ..
+                }
+        );
+        if is_message && came >= self.since {
+            self.taken.note(self.clock.now().moment.since(came), 1);
+        }
+    }
+}
 
 /// Records and judges.
 pub struct Recorder {
@@ -31,6 +60,10 @@ pub struct Recorder {
     /// Whether what others do was left out once; it is said once.
     leaves_out: bool,
     onlooker: Option<Onlooker>,
+    /// None in virtual time.
+    stopwatch: Option<Stopwatch>,
+    /// Whether there are more mock AGVs than tests talk about.
+    has_crowd: bool,
 }
 
 impl Recorder {
@@ -68,12 +101,28 @@ impl Recorder {
             guard,
             leaves_out: false,
             onlooker: None,
+            stopwatch: None,
+            has_crowd: matches!(entry.event(), Event::RunBegun { header } if header.vehicles.len() > NAMED_VEHICLES),
         })
     }
 
     /// Shows every record from now on to somebody who looks on.
     pub fn is_watched_by(&mut self, onlooker: Onlooker) {
         self.onlooker = Some(onlooker);
+    }
+
+    /// Measures from now on how long messages wait until they are recorded and judged, by the clock that stamps them.
+    pub fn is_timed_by(&mut self, clock: WallClock) {
+        self.stopwatch = Some(Stopwatch {
+            clock,
+            since: clock.now().moment,
+            taken: Histogram::default(),
+        });
+    }
+
+    /// How long messages have waited until they were recorded and judged; `None` where it was not measured.
+    pub fn time_to_judge(&self) -> Option<Spread> {
+        self.stopwatch.as_ref()?.taken.spread()
     }
 
     /// Records one occurrence: file first, then the judge. Of clients that are not the device only so much is recorded; what
@@ -102,6 +151,12 @@ impl Recorder {
             self.guard.observe_other(&entry);
         } else {
             self.guard.observe(&entry);
+        }
+        if let Some(stopwatch) = &mut self.stopwatch {
+            stopwatch.note(&entry);
+        }
+        if self.has_crowd {
+            self.guard.let_go(self.journal.forget_reading(READ));
         }
         if let Some(onlooker) = &mut self.onlooker {
             onlooker(&entry);

@@ -17,6 +17,14 @@ impl Random {
         Self(seed)
     }
 
+    /// One for the so manyth of several things that one seed begins: it does not depend on those before.
+    #[must_use]
+    pub fn of_number(seed: u64, number: u64) -> Self {
+        // Two generators whose beginnings are near each other would give the same numbers, one behind the other.
+        let first = Self::new(seed).below(u64::MAX).wrapping_add(number);
+        Self(Self::new(first).below(u64::MAX))
+    }
+
     /// A number below `bound`, which is not zero.
     pub fn below(&mut self, bound: u64) -> u64 {
         // SplitMix64, by Sebastiano Vigna.

@@ -2,6 +2,7 @@
 //! conversations, shrink what fails.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::time::Duration;
 
 use super::broken::family;
@@ -12,6 +13,7 @@ use super::findings::{Finding, by_cause, findings};
 use super::grammar::Grammar;
 use super::shrink::shrink;
 use super::writing::ConversationFile;
+use tck_base::shard::{Shard, dealt};
 use tck_base::verdict::Verdict;
 use tck_journal::Reason;
 use tck_result::{RunResult, TestResult};
@@ -82,6 +84,10 @@ pub struct Exploration {
     pub trials: usize,
     /// How long all of it may take: trying stimuli, holding conversations, shrinking.
     pub budget: Option<Duration>,
+    /// Which part of it is done, where other processes have the rest: of the stimuli that are tried one by one by their names, of
+    /// the conversations by their numbers. What one part learns no other part knows, so a conversation is drawn by seed and number
+    /// alone.
+    pub part: Option<Shard>,
 }
 
 /// What came of it.
@@ -183,13 +189,19 @@ impl Known {
 }
 
 impl Exploration {
+    /// The conversations that are to be held, by their numbers, counted from 0.
+    #[must_use]
+    pub fn numbers(&self) -> Range<usize> {
+        let all = self.conversations;
+        self.part.map_or(0..all, |part| part.of_many(all))
+    }
+
     /// The conversations that this seed draws.
     #[must_use]
     pub fn drawn(&self, grammar: &Grammar, coverage: &mut Coverage) -> Vec<(Chain, ConversationFile)> {
         let mut random = Random::new(self.seed);
-        let numbers = 1..=self.conversations;
-        numbers
-            .map(|number| self.one(grammar, &mut random, number, coverage))
+        self.numbers()
+            .map(|number| self.one(grammar, &mut random, number + 1, coverage))
             .collect()
     }
 
@@ -200,7 +212,13 @@ impl Exploration {
         number: usize,
         coverage: &mut Coverage,
     ) -> (Chain, ConversationFile) {
-        let chain = draw(grammar, random, self.length, coverage);
+        let chain = match self.part {
+            None => draw(grammar, random, self.length, coverage),
+            Some(_) => {
+                let mut random = Random::of_number(self.seed, number as u64);
+                draw(grammar, &mut random, self.length, &mut Coverage::default())
+            }
+        };
         let why = format!("Drawn by explore from the seed {}.", self.seed);
         let file = chain.file(grammar, &format!("explore/seed-{}-{number}", self.seed), &why);
         (chain, file)
@@ -322,6 +340,7 @@ impl Exploration {
         let ways = Chain::to_every_kind(&known.grammar);
         let mut probes: Vec<(Chain, ConversationFile)> = ways
             .into_iter()
+            .filter(|(name, _)| self.part.is_none_or(|part| dealt(name, part)))
             .map(|(name, chain)| {
                 let id = format!("explore/probe-{}", name.replace('.', "-"));
                 let file = chain.file(&known.grammar, &id, "Every stimulus is tried once.");
@@ -352,7 +371,10 @@ impl Exploration {
             for (chain, file) in probes.iter().filter(|_| !round.result.partial) {
                 let why = named(file).filter(|test| test.cause.is_none()).and_then(never_begins);
                 if let (Some(why), Some(name)) = (why, chain.stimuli().last()) {
-                    known.grammar.leave_out(name);
+                    // Other parts do not know it, and all draw from the same grammar.
+                    if self.part.is_none() {
+                        known.grammar.leave_out(name);
+                    }
                     known.left_out.push((family(name).to_owned(), why));
                 }
             }
@@ -366,16 +388,21 @@ impl Exploration {
     /// Holds conversations: a few are drawn, carried out, and what came of them is known to those that are drawn next.
     fn converse<S: Stage>(&self, known: &mut Known, stage: &mut S, note: &mut dyn FnMut(&str)) -> Result<(), S::Error> {
         let mut random = Random::new(self.seed);
-        let (mut number, mut fruitless) = (0, 0);
-        // One that does not begin, because its device was gone, is drawn anew.
-        while known.conversations < self.conversations && fruitless < FRUITLESS {
+        let own = self.numbers();
+        let (mut number, mut fruitless) = (own.start, 0);
+        // One that does not begin, because its device was gone, is drawn anew; a part has no numbers for that.
+        let is_out_of_numbers = |number: usize| self.part.is_some() && number >= own.end;
+        while known.conversations < own.len() && !is_out_of_numbers(number) && fruitless < FRUITLESS {
             // What was found has to be made shorter, which takes time as well.
             let share = match self.is_over(stage, SHRINKING_BEGINS) {
                 false => SHRINKING_BEGINS,
                 true if known.found.is_empty() && !self.is_over(stage, 1.0) => 1.0,
                 true => break,
             };
-            let until = number + self.at_once.max(1).min(self.conversations - known.conversations);
+            let mut until = number + self.at_once.max(1).min(own.len() - known.conversations);
+            if self.part.is_some() {
+                until = until.min(own.end);
+            }
             let drawn: Vec<(Chain, ConversationFile)> = (number + 1..=until)
                 .map(|number| self.one(&known.grammar, &mut random, number, &mut known.coverage))
                 .collect();

@@ -1,6 +1,7 @@
 //! What a run of conversations found: one finding for each requirement and place, and the conversations that show it.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use super::broken::family;
 use super::chain::Chain;
@@ -15,6 +16,15 @@ pub enum Source {
     Stimulus(String),
     /// A monitor.
     Monitor(String),
+}
+
+impl fmt::Display for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Stimulus(name) => write!(f, "what must be heard after {name}"),
+            Self::Monitor(name) => write!(f, "the monitor {name}"),
+        }
+    }
 }
 
 /// A requirement that is broken in one way.

@@ -14,6 +14,7 @@ mod exploration;
 mod findings;
 mod grammar;
 mod model;
+pub mod saved;
 pub mod shrink;
 #[cfg(test)]
 mod tests;

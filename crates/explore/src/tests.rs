@@ -5,6 +5,8 @@
     reason = "a test may fail by panicking"
 )]
 
+mod parts;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::convert::Infallible;
 use std::time::Duration;
@@ -40,6 +42,7 @@ fn exploration(grammar: Grammar, seed: u64, conversations: usize) -> Exploration
         length: 12,
         trials: 60,
         budget: None,
+        part: None,
     }
 }
 

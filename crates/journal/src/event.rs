@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 pub use super::fault::LinkFault;
+pub use super::latency::OwnLatency;
 pub use super::packet::{Close, Filter, Packet, Will};
 pub use super::payload::{PAYLOAD_LIMIT, PAYLOAD_PREFIX, Payload, hex};
 pub use super::plan::{
@@ -72,6 +73,9 @@ pub enum Event {
         /// Whether another device spoke than the one that was to be judged.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         stranger: bool,
+        /// How long the harness itself took with messages, where that was measured.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        latency: Option<OwnLatency>,
     },
     /// What the run is going to do, and why it leaves things out.
     Planned {

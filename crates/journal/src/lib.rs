@@ -9,6 +9,7 @@ pub mod event;
 mod fault;
 pub mod file;
 pub mod json;
+mod latency;
 mod packet;
 mod payload;
 pub mod place;
@@ -28,6 +29,7 @@ use tck_view::{MessageView, Names, Topic};
 
 pub use event::{Direction, Event, Packet, Payload, Record, Source, Will};
 pub use json::Parsed;
+pub use latency::{Histogram, OwnLatency, Spread};
 pub use plan::tool;
 use read::Read;
 pub use reason::{OwnError, Reason};
@@ -116,6 +118,13 @@ impl Entry {
         bytes + own.map_or(0, |read| read.parsed.weight())
     }
 
+    /// Forgets how it was read, which is done again when somebody asks. Gives about how many bytes of memory that frees.
+    fn forget(&mut self) -> u64 {
+        self.picture = OnceLock::new();
+        let read = self.read.take().filter(|read| Arc::strong_count(read) == 1);
+        read.map_or(0, |read| read.parsed.weight())
+    }
+
     fn shared(&self) -> Option<&Arc<Read>> {
         let payload = self.payload()?;
         Some(self.read.get_or_init(|| Arc::new(Read::of(payload))))
@@ -183,6 +192,14 @@ impl Journal {
         self.names = Arc::clone(names);
     }
 
+    /// Forgets how the record was read that stands so many places before the last one, if nobody else holds it: what it says is
+    /// read again when somebody asks. Gives about how many bytes of memory that frees.
+    pub fn forget_reading(&mut self, places: usize) -> u64 {
+        let at = self.entries.len().checked_sub(places + 1);
+        let entry = at.and_then(|at| self.entries.get_mut(at)).and_then(Arc::get_mut);
+        entry.map_or(0, Entry::forget)
+    }
+
     /// All records so far.
     #[must_use]
     pub fn entries(&self) -> &[Arc<Entry>] {
@@ -194,5 +211,43 @@ impl Journal {
     pub fn get(&self, seq: u64) -> Option<&Arc<Entry>> {
         let at = self.entries.binary_search_by_key(&seq, |entry| entry.seq()).ok()?;
         self.entries.get(at)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use event::Occurrence;
+    use tck_base::clock::Moment;
+
+    fn sent() -> Occurrence {
+        let at = Stamp {
+            moment: Moment::START,
+            utc: jiff::Timestamp::UNIX_EPOCH,
+        };
+        let event = Event::Sent {
+            topic: "state".to_owned(),
+            qos: 0,
+            retain: false,
+            payload: Payload::keep(br#"{ "nodeStates": [1, 2, 3] }"#.to_vec().into()),
+        };
+        Occurrence::harness(at, event)
+    }
+
+    #[test]
+    fn how_a_record_was_read_is_forgotten_where_nobody_holds_it_and_read_again_when_it_is_asked_for() {
+        let mut journal = Journal::new();
+        let held = journal.append(sent());
+        drop(journal.append(sent()));
+        drop(journal.append(sent()));
+        assert!(journal.entries().iter().all(|entry| entry.json().is_some()));
+        assert_eq!(journal.forget_reading(2), 0, "somebody holds it");
+        let freed = journal.forget_reading(1);
+        assert!(freed > 0);
+        assert_eq!(journal.forget_reading(1), 0, "there is nothing left to forget");
+        assert_eq!(journal.forget_reading(3), 0, "there is none so far back");
+        let again = journal.get(2).and_then(|entry| entry.json());
+        assert!(again.is_some() && again == held.json());
+        assert_eq!(journal.forget_reading(1), freed);
     }
 }

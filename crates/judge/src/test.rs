@@ -172,7 +172,9 @@ impl TestJudge {
 
     /// Shows it one entry. The timeline already holds it.
     pub fn observe(&mut self, entry: &Arc<Entry>, subject: Option<&str>, timeline: &Timeline, ground: &Ground) {
-        self.entries.push(Arc::clone(entry));
+        if !timeline.is_of_crowd(entry) {
+            self.entries.push(Arc::clone(entry));
+        }
         self.departure.observe(entry, subject, ground.pack.names());
         if let Some(span) = &mut self.result.journal {
             span.1 = entry.seq();

@@ -21,6 +21,9 @@ use tck_journal::event::{Direction, Event, MockVehicle, Packet};
 use tck_pack::Pack;
 use tck_view::{MessageView, Names, StateView, Topic};
 
+/// How many mock AGVs tests talk about. What further ones say is left to the monitors.
+pub const NAMED_VEHICLES: usize = 2;
+
 /// How the subjects of the second mock AGV end: `order@second`.
 pub const OF_SECOND: &str = "@second";
 
@@ -169,6 +172,17 @@ impl Timeline {
             return None;
         };
         self.topics.get(topic)
+    }
+
+    /// Whether it is what one of the mock AGVs has said that no test talks about.
+    #[must_use]
+    pub fn is_of_crowd(&self, entry: &Entry) -> bool {
+        let is_own = match entry.event() {
+            Event::Sent { .. } => self.own,
+            Event::Packet { .. } => entry.record.direction == Some(Direction::ToDevice),
+            _ => false,
+        };
+        is_own && self.place(entry).is_some_and(|place| place.vehicle >= NAMED_VEHICLES)
     }
 
     /// What the version calls the members of messages.
@@ -418,6 +432,51 @@ mod tests {
             payload: payload(),
         };
         [of_device(Event::Packet { connection, packet }), of_device(message)]
+    }
+
+    #[test]
+    fn what_further_vehicles_say_is_of_the_crowd_and_what_they_are_told_is_not() {
+        let vehicle = |number: usize| MockVehicle {
+            topics: ["state", "order"]
+                .map(|name| (name.to_owned(), format!("{number}/{name}")))
+                .into(),
+            ..MockVehicle::default()
+        };
+        let vehicles: Vec<MockVehicle> = (0..4).map(vehicle).collect();
+        let packs = Packs::load(&Assets::of_source_tree().unwrap()).unwrap();
+        let timeline = Timeline::of_vehicles(&vehicles, packs.latest());
+        let payload = || Payload::keep(bytes::Bytes::from_static(b"{}"));
+        let is_of_crowd = |occurrence: Occurrence| timeline.is_of_crowd(&Journal::new().append(occurrence));
+        let sent = |topic: &str| {
+            let topic = topic.to_owned();
+            let (qos, retain, payload) = (0, false, payload());
+            let event = Event::Sent {
+                topic,
+                qos,
+                retain,
+                payload,
+            };
+            Occurrence::harness(of_device(Event::Interrupted).at, event)
+        };
+        let packet = |topic: &str, direction| Occurrence {
+            direction: Some(direction),
+            ..of_device(Event::Packet {
+                connection: 1,
+                packet: Packet::Publish {
+                    topic: topic.to_owned(),
+                    qos: 0,
+                    retain: false,
+                    dup: false,
+                    packet_id: None,
+                    payload: payload(),
+                },
+            })
+        };
+        assert!(!is_of_crowd(sent("0/state")) && !is_of_crowd(sent("1/state")) && is_of_crowd(sent("2/state")));
+        assert!(
+            is_of_crowd(packet("3/state", Direction::ToDevice)) && !is_of_crowd(packet("1/state", Direction::ToDevice))
+        );
+        assert!(!is_of_crowd(packet("3/order", Direction::FromDevice)) && !is_of_crowd(sent("unknown")));
     }
 
     #[test]

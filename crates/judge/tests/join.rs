@@ -96,6 +96,7 @@ fn part(index: usize, of: usize, verdict: Verdict) -> RunPart {
             fleet: None,
             exploration: None,
             message_coverage: None,
+            harness_latency: None,
             on_word: Vec::new(),
             limits: vec!["Of one part.".to_owned()],
             deviations: BTreeMap::new(),

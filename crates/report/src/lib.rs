@@ -27,6 +27,7 @@ pub mod json;
 pub mod junit;
 pub mod keys;
 pub mod known;
+pub mod latency;
 pub mod manifest;
 pub mod markdown;
 pub mod no_result;

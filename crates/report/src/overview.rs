@@ -166,6 +166,9 @@ fn counts(result: &RunResult, color: Color, text: &mut String) {
     if let Some(fleet) = &result.fleet {
         let _ = writeln!(text, "{:<13} {}", "fleet", super::fleet::line(fleet));
     }
+    if let Some(latency) = result.harness_latency {
+        let _ = writeln!(text, "{:<13} {}", "harness", super::latency::line(latency));
+    }
 }
 
 /// `12 pass, 1 warning, 1 fail, 2 not applicable`, worst last; noughts left out.

@@ -24,8 +24,8 @@ pub use self::parts::{Gathered, Part, gathered, most_common};
 pub use self::program::{ProgramEnd, ProgramResult};
 pub use self::sent::{Sent, SentMember};
 use tck_base::verdict::{Accumulated, Verdict};
-use tck_journal::Reason;
 use tck_journal::event::{Setting, ShardRecord};
+use tck_journal::{OwnLatency, Reason};
 
 /// `result.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -97,6 +97,9 @@ pub struct RunResult {
     /// Which members, words and action types of the standard came by, and which never did; absent in results of old.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub message_coverage: Option<MessageCoverage>,
+    /// How long the harness took with messages itself; absent in virtual time, and in results of old.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub harness_latency: Option<OwnLatency>,
     /// What rests on a person's word.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub on_word: Vec<OnWord>,

@@ -460,6 +460,7 @@ impl Stage<'_> {
         let header = Box::new(header);
         let first = Occurrence::harness(self.clock.now(), Event::RunBegun { header });
         let mut recorder = Recorder::begin(&self.library.rules, self.writer, self.earlier, first)?;
+        recorder.is_timed_by(self.clock);
         if let Some(onlooker) = self.onlooker {
             recorder.is_watched_by(onlooker);
         }

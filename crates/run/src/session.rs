@@ -19,8 +19,8 @@ use super::sheet::Sheet;
 use tck_base::verdict::Verdict;
 use tck_course::Layout;
 use tck_engine::{Engine, EngineError, Operator, Recorder, Watcher};
-use tck_journal::Reason;
 use tck_journal::event::{Event, Gate, Plan, PlannedTest};
+use tck_journal::{OwnLatency, Reason};
 use tck_judge::RunJudge;
 use tck_net::link::Link;
 use tck_net::link::mqtt::BenchInfo;
@@ -183,6 +183,7 @@ pub async fn run<L: Link, O: Operator>(
         partial,
         reason,
         stranger,
+        latency: OwnLatency::of(engine.link.time_to_pass_on(), engine.recorder.time_to_judge()),
     });
     let synced = engine.recorder.sync();
     match (recorded, synced) {

@@ -1,6 +1,7 @@
 //! `audit`: judge what was recorded.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::Args;
 
@@ -71,7 +72,10 @@ pub struct Audit {
     /// Leave out names of makers, vehicles, maps, nodes, orders and loads, free texts, and where on the floor something is
     #[arg(long, conflicts_with_all = ["vehicle", "follow"])]
     pub redact: bool,
-    /// Only part I of N of the vehicles, for several processes at once; `report --merge` joins the parts (docs/shards.md)
+    /// Cut each vehicle's time where it is at rest into stretches of this length at least, such as 6h, each judged by itself
+    #[arg(long, value_name = "TIME", value_parser = super::watch::time, conflicts_with_all = ["follow", "slice", "export", "baseline"])]
+    pub cut: Option<Duration>,
+    /// Only part I of N of the vehicles (of the stretches with --cut), for several processes; `report --merge` joins the parts (docs/shards.md)
     #[arg(long, value_name = "I/N", conflicts_with_all = ["follow", "slice"])]
     pub shard: Option<Shard>,
     /// How results are written to standard output

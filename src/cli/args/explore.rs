@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
+use tck_base::shard::Shard;
 
 use super::{DeviceArgs, OutputArgs, PageArgs, SuiteArgs};
 
@@ -51,6 +52,9 @@ pub struct Explore {
     /// Try at most so many shorter conversations for each finding
     #[arg(long, value_name = "NUMBER", default_value_t = 60)]
     pub shrink_budget: usize,
+    /// Only part I of N of the conversations and of the stimuli tried one by one; `report --merge` joins the parts (docs/shards.md)
+    #[arg(long, value_name = "I/N", conflicts_with_all = ["replay", "every_fault", "stimuli"])]
+    pub shard: Option<Shard>,
     /// Carry out the conversations of these files again, and no others
     #[arg(long, value_name = "FILE", conflicts_with_all = ["focus", "every_fault"])]
     pub replay: Vec<PathBuf>,

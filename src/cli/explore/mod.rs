@@ -7,15 +7,19 @@ mod stage;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::args::{Explore, Format};
+use super::args::Explore;
 use super::device::check_faults;
 use super::exit::Exit;
+use super::explored;
 use super::problem::Problem;
 use super::reference::{self, Asked};
 use stage::{Device, OnStage};
 use tck_base::diagnostic::Diagnostic;
+use tck_base::shard::{ChosenShard, Shard};
 use tck_base::verdict::Verdict;
+use tck_explore::saved::ExploredResult;
 use tck_explore::{Chain, ConversationFile, Exploration, Grammar, Purpose, Shown, Stage as _, family};
+use tck_journal::event::ShardRecord;
 use tck_profile::{self as profile, Surroundings};
 
 /// How much more often a stimulus is drawn on which the exploration is focused.
@@ -63,10 +67,25 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
         super::print(&show::stimuli(&grammar))?;
         return Ok(Exit::Conforms);
     }
+    let part = match arguments.replay.is_empty() && arguments.every_fault.is_none() {
+        true => super::shard::chosen(arguments.shard, &surroundings)?,
+        false => None,
+    };
+    let shard = part.map(|part| share(&part, &grammar, arguments.conversations));
+    if let Some(ShardRecord { index, of, filled, .. }) = shard.as_ref().filter(|part| part.index > part.filled) {
+        let why =
+            format!("there is no conversation for part {index} of {of}: they are divided into no more than {filled}");
+        return Err(Problem::NothingToDo(why));
+    }
     let device = Device::of(arguments, &effective, &pack, &surroundings)?;
+    // All parts draw from one seed.
+    let usual_seed = || match shard {
+        Some(_) => 1,
+        None => device.usual_seed(),
+    };
     let exploration = Exploration {
         grammar,
-        seed: arguments.seed.unwrap_or_else(|| device.usual_seed()),
+        seed: arguments.seed.unwrap_or_else(usual_seed),
         conversations: arguments.conversations,
         at_once: arguments
             .conversations
@@ -75,6 +94,7 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
         length: arguments.length,
         trials: arguments.shrink_budget,
         budget: arguments.budget,
+        part: shard.as_ref().and_then(|part| Shard::new(part.index, part.filled)),
     };
     if let Some(every) = arguments.every_fault {
         return measure::every_fault(library, &pack, &exploration, every.max(1), arguments);
@@ -82,15 +102,32 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
     let mut stage = OnStage::new(library, pack, device, &arguments.output.out)?;
     stage.serve_page(&effective)?;
     let outcome = match arguments.replay.as_slice() {
-        [] => held(&exploration, &mut stage, arguments.output.format),
+        [] => held(&exploration, &mut stage, arguments, shard),
         replayed => replay(replayed, &mut stage),
     };
     stage.finish(outcome.as_ref().ok());
     outcome
 }
 
-/// Holds the conversations, and says what came of them.
-fn held(exploration: &Exploration, stage: &mut OnStage, format: Format) -> Result<Exit, Problem> {
+/// The part of an exploration that one process does.
+fn share(part: &ChosenShard, grammar: &Grammar, conversations: usize) -> ShardRecord {
+    let count = format!("{conversations} conversations");
+    let stimuli = grammar.stimuli.keys().map(String::as_str);
+    let names: Vec<&str> = stimuli.chain([count.as_str()]).collect();
+    let filled = part.shard.of.min(conversations.max(1));
+    ShardRecord {
+        whole: conversations,
+        ..ShardRecord::of(part, filled, &names)
+    }
+}
+
+/// Holds the conversations, and says what came of them. A part leaves a result of its own, to be joined with those of others.
+fn held(
+    exploration: &Exploration,
+    stage: &mut OnStage,
+    arguments: &Explore,
+    shard: Option<ShardRecord>,
+) -> Result<Exit, Problem> {
     let page = stage.page();
     let explored = exploration.carry_out(stage, &mut |text| {
         eprintln!("{text}");
@@ -108,8 +145,20 @@ fn held(exploration: &Exploration, stage: &mut OnStage, format: Format) -> Resul
         exploration,
         stage.catalogue(),
         place,
-        format,
+        arguments.output.format,
     )?)?;
+    if let Some(shard) = shard {
+        let name = format!("exploration-{}-{}-of-{}", exploration.seed, shard.index, shard.of);
+        let mut result = ExploredResult::of(&explored, exploration, shard);
+        stage.describe(&mut result);
+        result.given = arguments.fault.iter().chain(&arguments.tolerance).cloned().collect();
+        let folder = arguments.output.out.join(name);
+        let root = explored::write(&result, &folder)?;
+        super::tell(&format!(
+            "the result of this part in {} has the root hash sha256:{root}",
+            folder.display()
+        ));
+    }
     let fails = explored.findings.iter().any(Shown::fails);
     // There was no time to see whether it shows again.
     let is_open = |one: &Shown| one.shows.1 == 0 && one.finding.verdict == Verdict::Fail;

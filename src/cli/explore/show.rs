@@ -153,9 +153,9 @@ fn described(word: &str, shown: &Shown, catalogue: &Catalogue, place: Place<'_>,
     } else {
         "conversations"
     };
-    let _ = writeln!(text, "  by       {}, in {} {times}", by(&one.source), one.count);
+    let _ = writeln!(text, "  by       {}, in {} {times}", one.source, one.count);
     if !shown.others.is_empty() {
-        let others: Vec<String> = shown.others.iter().map(|other| by(&other.source)).collect();
+        let others: Vec<String> = shown.others.iter().map(|other| other.source.to_string()).collect();
         let _ = writeln!(text, "  and by   {}", others.join(", "));
     }
     let _ = writeln!(text, "  shortest {}", one.chain.stimuli().join(", "));
@@ -168,13 +168,6 @@ fn described(word: &str, shown: &Shown, catalogue: &Catalogue, place: Place<'_>,
     }
     let again = again(std::env::args().skip(1), &path(shown, place));
     let _ = writeln!(text, "  again    vda5050-tck {again}\n");
-}
-
-fn by(source: &Source) -> String {
-    match source {
-        Source::Stimulus(name) => format!("what must be heard after {name}"),
-        Source::Monitor(name) => format!("the monitor {name}"),
-    }
 }
 
 fn path(shown: &Shown, place: Place<'_>) -> String {
@@ -201,19 +194,20 @@ fn finding(shown: &Shown, place: Place<'_>) -> serde_json::Value {
         "message": one.message,
         "conversations": one.count,
         "shortest": one.chain.stimuli(),
-        "others": shown.others.iter().map(|other| by(&other.source)).collect::<Vec<_>>(),
+        "others": shown.others.iter().map(|other| other.source.to_string()).collect::<Vec<_>>(),
         "shows": { "times": shown.shows.0, "of": shown.shows.1 },
         "file": path(shown, place),
     })
 }
 
 /// What says how long an exploration is and what it says, each with a value; a conversation that is carried out again has that.
-const OF_EXPLORATION: [&str; 6] = [
+const OF_EXPLORATION: [&str; 7] = [
     "--budget",
     "--conversations",
     "--focus",
     "--length",
     "--replay",
+    "--shard",
     "--shrink-budget",
 ];
 
@@ -284,6 +278,8 @@ mod tests {
             "--conversations",
             "40",
             "--focus=blink",
+            "--shard",
+            "2/4",
             "--fault",
             "x",
         ];

@@ -17,6 +17,7 @@ use crate::cli::run::{hold, person};
 use crate::ui::Prompter;
 use tck_base::clock::WallClock;
 use tck_course::HERE;
+use tck_explore::saved::ExploredResult;
 use tck_explore::{ConversationFile, Explored, Purpose, Round, Shown, Stage};
 use tck_journal::Reason;
 use tck_journal::event::Event;
@@ -198,6 +199,13 @@ impl OnStage {
 
     pub(super) fn catalogue(&self) -> &Catalogue {
         &self.library.rules.catalogue
+    }
+
+    /// Says of the result of a part what it is about.
+    pub(super) fn describe(&self, result: &mut ExploredResult) {
+        result.suites_sha256.clone_from(&self.library.rules.sha256);
+        result.protocol = self.pack.version.to_string();
+        result.manufacturer = self.subject().manufacturer;
     }
 
     /// The report that was written last.

@@ -215,6 +215,7 @@ fn case(end: fn() -> End, tests: Vec<TestResult>, around: fn(&mut Case)) -> Case
             fleet: None,
             exploration: None,
             message_coverage: None,
+            harness_latency: None,
             on_word: Vec::new(),
             limits: Vec::new(),
             deviations: BTreeMap::new(),

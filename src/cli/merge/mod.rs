@@ -10,6 +10,7 @@ use std::path::{Component, Path, PathBuf};
 use super::args::{Format, Report};
 use super::bundle_state::{self, PARTS};
 use super::exit::Exit;
+use super::explored;
 use super::problem::Problem;
 use super::qualified;
 use tck_audit::saved::{self, Lies};
@@ -32,6 +33,7 @@ enum Kind {
     Run,
     Audit,
     Qualification,
+    Exploration,
 }
 
 impl Kind {
@@ -40,6 +42,8 @@ impl Kind {
             Self::Audit
         } else if qualified::is_qualification(bundle) {
             Self::Qualification
+        } else if explored::is_exploration(bundle) {
+            Self::Exploration
         } else {
             Self::Run
         }
@@ -53,13 +57,13 @@ pub(super) fn merge(arguments: &Report, folders: &[PathBuf], out: &Path) -> Resu
         let title = format!("{} is there already, and nothing is written over it", out.display());
         return Err(wrong(title));
     }
-    let bundles = bundles(folders)?;
+    let bundles = without_rounds(bundles(folders)?);
     std::fs::create_dir_all(out).map_err(|error| unwritable(out, &error))?;
     let library = crate::assets::library(arguments.suites.own())?;
     let kinds: Vec<Kind> = bundles.iter().map(|bundle| Kind::of(bundle)).collect();
     if let Some(at) = kinds.iter().position(|kind| *kind != kinds[0]) {
         let title = format!(
-            "{} and {} are not of one kind: runs, audits and qualifications are joined each by themselves",
+            "{} and {} are not of one kind: runs, audits, qualifications and explorations are joined each by themselves",
             bundles[0].display(),
             bundles[at].display()
         );
@@ -68,6 +72,7 @@ pub(super) fn merge(arguments: &Report, folders: &[PathBuf], out: &Path) -> Resu
     match kinds.first() {
         Some(Kind::Audit) => return others::audits(&bundles, out, arguments.format, &library),
         Some(Kind::Qualification) => return others::qualifications(&bundles, out, &library),
+        Some(Kind::Exploration) => return others::explorations(&bundles, out, arguments.format),
         _ => {}
     }
     let mut parts = Vec::new();
@@ -226,6 +231,24 @@ fn bundles(folders: &[PathBuf]) -> Result<Vec<PathBuf>, Problem> {
         super::tell("a part that is given twice counts once");
     }
     Ok(all)
+}
+
+/// Without the reports of conversations where results of explorations are joined, which rest on them.
+fn without_rounds(all: Vec<PathBuf>) -> Vec<PathBuf> {
+    if all.iter().all(|bundle| Kind::of(bundle) != Kind::Exploration) {
+        return all;
+    }
+    let is_part = |bundle: &Path| result_file::read(&bundle.join(RESULT)).is_ok_and(|result| result.shard.is_some());
+    let (kept, rounds): (Vec<PathBuf>, Vec<PathBuf>) = all
+        .into_iter()
+        .partition(|bundle| Kind::of(bundle) != Kind::Run || is_part(bundle));
+    if !rounds.is_empty() {
+        super::tell(&format!(
+            "{} reports of conversations are evidence of the parts, and are not joined by themselves",
+            rounds.len()
+        ));
+    }
+    kept
 }
 
 fn search(folder: &Path, deep: usize, all: &mut Vec<PathBuf>) -> Result<(), Problem> {

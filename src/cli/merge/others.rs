@@ -1,16 +1,18 @@
-//! Parts of audits and of qualifications, which have no journals: what is joined are their results.
+//! Parts of audits, qualifications and explorations, which have no journals: what is joined are their results.
 
 use std::path::{Path, PathBuf};
 
 use super::{RESULT, digest, intact, place, relative, unwritable, wrong};
 use crate::cli::args::Format;
 use crate::cli::exit::Exit;
+use crate::cli::explored;
 use crate::cli::problem::Problem;
 use crate::cli::qualified;
 use crate::cli::recordings::show;
 use tck_audit::join::AuditPart;
 use tck_audit::{bundle, saved};
 use tck_base::diagnostic::Diagnostic;
+use tck_explore::saved::ExplorationPart;
 use tck_judge::Library;
 use tck_qualify::saved::QualificationPart;
 use tck_result::{MergedBundle, MergedParts};
@@ -53,6 +55,23 @@ pub(super) fn qualifications(bundles: &[PathBuf], out: &Path, library: &Library)
     let root = qualified::write(&joined, out)?;
     tell(out, &root);
     qualified::show(&joined)
+}
+
+/// Joins parts of an exploration into a new bundle.
+pub(super) fn explorations(bundles: &[PathBuf], out: &Path, format: Format) -> Result<Exit, Problem> {
+    let mut parts = Vec::new();
+    for leaf in leaves(bundles, out, |folder| Ok(explored::read(folder)?.merged))? {
+        let folder = leaf.result.parent().unwrap_or(out);
+        parts.push(ExplorationPart {
+            result: explored::read(folder)?,
+            bundle: leaf.bundle,
+            sha256: leaf.sha256,
+        });
+    }
+    let joined = tck_explore::saved::join(&parts).ok_or_else(no_part)?;
+    let root = explored::write(&joined, out)?;
+    tell(out, &root);
+    explored::show(&joined, format)
 }
 
 /// A part that was not joined before, or that is kept in a bundle of joined ones.

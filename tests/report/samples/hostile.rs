@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::json;
 use vda5050_tck::journal::event::{Close, LinkFault, StepEnd};
-use vda5050_tck::journal::{Direction, Event, Journal, Packet, Payload};
+use vda5050_tck::journal::{Direction, Event, Journal, OwnLatency, Packet, Payload, Spread};
 use vda5050_tck::pack::Role;
 use vda5050_tck::report::sources::{ClauseSource, HowDecided, MonitorSource, RequirementText, Sources, TestSource};
 use vda5050_tck::result::{
@@ -24,6 +24,12 @@ pub const HOSTILE: &str = "<script>alert(1)</script>\"'&]]>\u{1b}[31m\u{0}\u{202
 /// A partial run in which every string is hostile.
 pub fn hostile() -> (RunResult, Journal, Sources) {
     let evil = || HOSTILE.to_owned();
+    let endless = Spread {
+        count: u64::MAX,
+        median_micros: u64::MAX,
+        p99_micros: u64::MAX,
+        worst_micros: u64::MAX,
+    };
     let mut record = Recorder::new();
     record.harness(header(&[HOSTILE]));
     let first = record.step(HOSTILE);
@@ -208,6 +214,7 @@ pub fn hostile() -> (RunResult, Journal, Sources) {
         }],
         exploration: Some(explored()),
         message_coverage: Some(shown()),
+        harness_latency: OwnLatency::of(Some(endless), Some(endless)),
         on_word: vec![OnWord {
             test: evil(),
             kind: WordKind::Answer,

@@ -169,6 +169,7 @@ pub fn run(tests: Vec<TestResult>, monitors: Vec<MonitorResult>) -> RunResult {
         fleet: None,
         exploration: None,
         message_coverage: None,
+        harness_latency: None,
         on_word: Vec::new(),
         limits: vec!["Only tests of the group order were selected.".to_owned()],
         deviations: BTreeMap::new(),

@@ -134,6 +134,7 @@ impl<'r> Migrating<'r> {
                 only: each_by_itself(rules),
                 protocol,
                 shard: None,
+                cut: None,
             };
             Audit::new(rules, options)
         };

@@ -14,6 +14,7 @@ use super::conversation_coverage;
 use super::merge;
 use super::rules::Rules;
 use tck_base::verdict::{Accumulated, Verdict};
+use tck_journal::OwnLatency;
 use tck_journal::event::{DIVIDED_TESTS, DIVIDED_VEHICLES};
 use tck_pack::Role;
 use tck_result::{
@@ -101,6 +102,7 @@ pub fn join(rules: &Rules, parts: &[RunPart]) -> Result<RunResult, JoinError> {
         message_coverage: results()
             .filter_map(|one| one.message_coverage.clone())
             .reduce(MessageCoverage::and),
+        harness_latency: results().filter_map(|one| one.harness_latency).reduce(OwnLatency::and),
         on_word: results().flat_map(|one| one.on_word.clone()).collect(),
         fleet: fleet::fleet(own),
         capabilities: first.result.capabilities.clone(),

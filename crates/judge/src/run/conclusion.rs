@@ -13,8 +13,8 @@ use super::super::requirement_verdict::RequirementVerdict;
 use super::RunJudge;
 use tck_base::pattern::Bindings;
 use tck_base::verdict::{Accumulated, Verdict};
-use tck_journal::Reason;
 use tck_journal::event::Gate;
+use tck_journal::{OwnLatency, Reason, Spread};
 use tck_pack::Decided;
 use tck_result::{
     Capability, Decision, DeviceIdentity, MessageCoverage, NotDecided, OnWord, ProgramResult, RequirementResult,
@@ -127,6 +127,7 @@ impl RunJudge {
                 .collect(),
             fleet,
             message_coverage: None,
+            harness_latency: self.latency(),
             on_word: self.on_word(),
             limits,
             deviations: self.plan.deviations.clone(),
@@ -181,6 +182,30 @@ impl RunJudge {
         }
     }
 
+    /// How long the harness took itself, in this run and in those before it.
+    fn latency(&self) -> Option<OwnLatency> {
+        let before = self.earlier.as_ref().and_then(|earlier| earlier.latency());
+        before.into_iter().chain(self.latency).reduce(OwnLatency::and)
+    }
+
+    /// That the harness was slower with a message than the device may be with anything.
+    fn too_slow(&self) -> Option<String> {
+        let latency = self.latency?;
+        let shortest = self.ground.time.shortest();
+        let is_slow = |spread: &Spread| spread.worst() > shortest;
+        let worst = [latency.passed_on, latency.judged]
+            .into_iter()
+            .flatten()
+            .filter(is_slow);
+        let worst = worst.map(Spread::worst).max()?;
+        Some(format!(
+            "The harness itself took up to {:.1} s to pass a message on or to judge it, longer than the shortest time limit of this \
+             run ({:.1} s): what it sent may have come that much later.",
+            worst.as_secs_f64(),
+            shortest.as_secs_f64()
+        ))
+    }
+
     /// Why it is not certain that it was the device that was judged.
     fn mixed(&self) -> Option<String> {
         let before = self.earlier.as_ref().and_then(|earlier| earlier.mixed());
@@ -215,6 +240,7 @@ impl RunJudge {
                 lag.as_secs_f64()
             ));
         }
+        limits.extend(self.too_slow());
         if let Some(story) = self.program.result().and_then(|program| program.story()) {
             limits.push(format!("{story}.").replacen("the program", "The program", 1));
         }

@@ -31,8 +31,8 @@ use super::test::TestJudge;
 use super::timeline::{Timeline, TopicOwner};
 use tck_base::clock::{Moment, Stamp};
 use tck_base::verdict::Verdict;
-use tck_journal::Entry;
 use tck_journal::event::{Event, Occurrence, Plan, Reading, RunHeader, Waiver};
+use tck_journal::{Entry, OwnLatency};
 use tck_pack::Role;
 use tck_result::{Repetition, TestResult};
 use tck_suite::model::{Monitor, Test};
@@ -79,6 +79,8 @@ pub struct RunJudge {
     earlier: Option<Box<Self>>,
     plan: Plan,
     end: Option<(bool, Option<String>)>,
+    /// How long the harness took itself.
+    latency: Option<OwnLatency>,
     /// Another device spoke than the one that was to be judged.
     is_stranger: bool,
 }
@@ -133,6 +135,7 @@ impl RunJudge {
             earlier: None,
             plan: Plan::default(),
             end: None,
+            latency: None,
             is_stranger: false,
             left_out: false,
         })
@@ -191,8 +194,10 @@ impl RunJudge {
                 partial,
                 reason,
                 stranger,
+                latency,
             } => {
                 self.is_stranger = *stranger;
+                self.latency = *latency;
                 self.break_off(reason.as_deref().unwrap_or("the run ended before the test did"));
                 self.end = Some((*partial, reason.clone()));
                 self.watches.finish(entry.at().moment, &self.ground);

@@ -4,6 +4,7 @@
 //! waits. A flooding device is thus slowed down by TCP; nothing is lost and memory stays bounded.
 
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use tokio::sync::{Semaphore, SemaphorePermit, mpsc};
 
@@ -11,6 +12,7 @@ use super::LinkError;
 use super::heard::Heard;
 use tck_base::clock::{Stamp, WallClock};
 use tck_journal::event::{Direction, Event, Occurrence, Packet, Source};
+use tck_journal::{Histogram, Spread};
 
 /// How many bytes of payload may wait to be read.
 const ROOM: u32 = 64 << 20;
@@ -38,6 +40,8 @@ pub struct Reporter {
     /// Held while an occurrence is stamped and put in, so that the order of stamps is the order of the inbox.
     turn: Arc<Mutex<()>>,
     heard: Arc<Heard>,
+    /// How long the tap took to hand messages on.
+    passed_on: Arc<Mutex<Histogram>>,
 }
 
 /// Room in the inbox for what is about to be done.
@@ -53,6 +57,7 @@ pub fn inbox(clock: WallClock) -> (Reporter, Inbox) {
         room: room.clone(),
         turn: Arc::default(),
         heard: Arc::default(),
+        passed_on: Arc::default(),
     };
     (reporter, Inbox { items, room })
 }
@@ -126,6 +131,18 @@ impl Reporter {
         self.heard.wait(topic, payload).await;
     }
 
+    /// So many messages were handed on so long after they had been read.
+    pub fn passed_on(&self, took: Duration, messages: u64) {
+        let mut passed_on = self.passed_on.lock().unwrap_or_else(PoisonError::into_inner);
+        passed_on.note(took, messages);
+    }
+
+    /// How long it took to hand messages on; `None` where none was.
+    #[must_use]
+    pub fn time_to_pass_on(&self) -> Option<Spread> {
+        self.passed_on.lock().unwrap_or_else(PoisonError::into_inner).spread()
+    }
+
     /// Reports that the link is broken. Never waits.
     pub fn broken(&self, error: LinkError) {
         let _ = self.items.send((0, Item::Broken(error)));
@@ -176,8 +193,6 @@ fn cost(event: &Event) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
     use super::*;
     use tck_journal::event::Payload;
 

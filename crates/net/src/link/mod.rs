@@ -11,8 +11,8 @@ pub mod mqtt;
 use crate::bench::{LinkError, Offer};
 use tck_base::clock::{Moment, Stamp};
 use tck_base::device::{Commanded, Publication};
-use tck_journal::Vantage;
 use tck_journal::event::{LinkFault, Occurrence};
+use tck_journal::{Spread, Vantage};
 
 /// The bench as the engine sees it. Not used as a trait object; the engine is generic over it.
 #[expect(async_fn_in_trait, reason = "the engine runs on one thread and needs no Send bound")]
@@ -43,6 +43,11 @@ pub trait Link {
 
     /// Offers a file; returns its address as the device must use it.
     async fn serve(&mut self, offer: Offer) -> Result<String, LinkError>;
+
+    /// How long messages took through the tap, as far as that was the harness's own time; `None` without a tap.
+    fn time_to_pass_on(&self) -> Option<Spread> {
+        None
+    }
 
     /// Gives a command to a simulated device that lives on this link, if there is one.
     fn command(&mut self, name: &str, parameters: serde_json::Value) -> Commanded {

@@ -61,6 +61,8 @@ struct Held {
     /// Reported when it goes on.
     report: Option<Event>,
     is_connect: bool,
+    /// When it was read, of a message that nothing but the harness holds back.
+    read_at: Option<Instant>,
 }
 
 /// One direction.
@@ -128,7 +130,10 @@ impl<'a> Pump<'a> {
                     if restores != self.restores {
                         self.restores = restores;
                         let now = Instant::now();
-                        self.held.iter_mut().for_each(|held| held.due = now);
+                        for held in &mut self.held {
+                            held.due = now;
+                            held.read_at = None;
+                        }
                     }
                 }
                 () = self.both.changed.notified(), if ended => {}
@@ -140,9 +145,10 @@ impl<'a> Pump<'a> {
                             self.end(Ok(())).await;
                         }
                         Ok(_) => {
-                            if !self.run_ahead(&bytes, &mut to).await {
+                            let read_at = Instant::now();
+                            if !self.run_ahead(&bytes, read_at, &mut to).await {
                                 self.reader.push(&bytes);
-                                self.take_pieces().await;
+                                self.take_pieces(read_at).await;
                             }
                             bytes.clear();
                         }
@@ -180,7 +186,7 @@ impl<'a> Pump<'a> {
 
     async fn end(&mut self, how: io::Result<()>) {
         if let Some(piece) = self.reader.rest() {
-            self.take(piece).await;
+            self.take(piece, Instant::now()).await;
         }
         match self.direction {
             Direction::FromDevice => {
@@ -206,7 +212,7 @@ impl<'a> Pump<'a> {
 
     /// Forwards what was read before it is decoded and reported, where nothing stands before it and nothing may become of it but
     /// that. What the other side does not take at once is put in line. False when it has to be looked at first.
-    async fn run_ahead<W: AsyncWrite + Unpin>(&mut self, bytes: &[u8], to: &mut W) -> bool {
+    async fn run_ahead<W: AsyncWrite + Unpin>(&mut self, bytes: &[u8], read_at: Instant, to: &mut W) -> bool {
         let shared = self.shared;
         let begun = self.both.has_begun() && self.both.connect_forwarded.load(Relaxed);
         if !begun || !self.held.is_empty() || !self.reader.is_between_packets() {
@@ -227,7 +233,10 @@ impl<'a> Pump<'a> {
                 .reporter
                 .report_behind(room, Source::Tap, Some(self.direction), || {
                     let taken = Pin::new(&mut *to).poll_write(context, bytes);
-                    (taken, self.decoded(bytes))
+                    let took = read_at.elapsed();
+                    let events = self.decoded(bytes);
+                    shared.reporter.passed_on(took, messages(&events));
+                    (taken, events)
                 });
             Poll::Ready(Some(taken))
         });
@@ -244,6 +253,7 @@ impl<'a> Pump<'a> {
                 raw: Bytes::copy_from_slice(rest),
                 report: None,
                 is_connect: false,
+                read_at: None,
             });
         }
         true
@@ -287,17 +297,19 @@ impl<'a> Pump<'a> {
         }
     }
 
-    async fn take_pieces(&mut self) {
+    async fn take_pieces(&mut self, read_at: Instant) {
         self.learn_level();
         while let Some(piece) = self.reader.next_piece() {
-            self.take(piece).await;
+            self.take(piece, read_at).await;
         }
     }
 
     /// Reports a piece where that is due, asks what becomes of it, and puts it in line.
-    async fn take(&mut self, piece: Piece) {
+    async fn take(&mut self, piece: Piece, read_at: Instant) {
         let mut fate = Fate::Forward;
         let mut is_connect = false;
+        let is_timed = matches!(piece.content, Ok(Packet::Publish { .. }))
+            && self.faults(|faults| faults.lets_all_by(self.direction));
         let evidence = piece.evidence();
         match &piece.content {
             Ok(Packet::Publish { topic, .. }) => {
@@ -342,6 +354,7 @@ impl<'a> Pump<'a> {
                 raw: raw.clone(),
                 report: report.clone(),
                 is_connect,
+                read_at: None,
             });
             let (raw, report) = again(&raw, report);
             self.hold(Held {
@@ -349,6 +362,7 @@ impl<'a> Pump<'a> {
                 raw,
                 report,
                 is_connect,
+                read_at: None,
             });
         } else if fate == Fate::Forward {
             self.hold(Held {
@@ -356,6 +370,7 @@ impl<'a> Pump<'a> {
                 raw,
                 report,
                 is_connect,
+                read_at: is_timed.then_some(read_at),
             });
         }
     }
@@ -375,6 +390,7 @@ impl<'a> Pump<'a> {
     async fn forward<W: AsyncWrite + Unpin>(&mut self, to: &mut W) -> io::Result<()> {
         while self.may_go() {
             let mut batch = BytesMut::new();
+            let mut timed = Vec::new();
             while batch.len() < WRITE_SIZE
                 && self.may_go()
                 && let Some(held) = self.held.pop_front()
@@ -387,11 +403,30 @@ impl<'a> Pump<'a> {
                     self.both.connect_forwarded.store(true, Relaxed);
                 }
                 batch.extend_from_slice(&held.raw);
+                timed.extend(held.read_at);
+            }
+            // How long the other side lets it wait is not the harness's own time.
+            for read_at in timed {
+                self.shared.reporter.passed_on(read_at.elapsed(), 1);
             }
             to.write_all(&batch).await?;
         }
         to.flush().await
     }
+}
+
+/// How many of these are messages.
+fn messages(events: &[Event]) -> u64 {
+    let is_message = |event: &&Event| {
+        matches!(
+            event,
+            Event::Packet {
+                packet: Packet::Publish { .. },
+                ..
+            }
+        )
+    };
+    events.iter().filter(is_message).count() as u64
 }
 
 /// The copy of a PUBLISH that is sent twice: DUP is set where the standard of MQTT allows it.
@@ -437,142 +472,4 @@ async fn sleep_until(due: Option<Instant>) {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::sync::Mutex;
-
-    use tokio::io::{DuplexStream, duplex};
-
-    use super::*;
-    use crate::bench::endpoint::Endpoint;
-    use crate::bench::inbox::{Inbox, inbox};
-    use crate::bench::kin::Kin;
-    use crate::tap::Upstream;
-    use tck_base::clock::WallClock;
-    use tck_journal::event::LinkFault;
-
-    const CONNECT: &[u8] = b"\x10\x0e\x00\x04MQTT\x04\x02\x00\x00\x00\x02id";
-
-    fn shared() -> (Shared, Inbox) {
-        let (reporter, inbox) = inbox(WallClock::start());
-        let broker = Endpoint::plain(([127, 0, 0, 1], 1).into());
-        let shared = Shared {
-            reporter,
-            upstream: Upstream {
-                broker,
-                embedded: false,
-            },
-            tls: None,
-            kin: Kin::default(),
-            faults: Mutex::default(),
-            control: watch::Sender::default(),
-            open: watch::Sender::default(),
-        };
-        (shared, inbox)
-    }
-
-    fn publish(number: u8, size: usize) -> Vec<u8> {
-        let length = size + 3;
-        let mut packet = vec![0x30];
-        if length > 127 {
-            packet.push(u8::try_from(length % 128).unwrap() | 0x80);
-            packet.push(u8::try_from(length / 128).unwrap());
-        } else {
-            packet.push(u8::try_from(length).unwrap());
-        }
-        packet.extend_from_slice(b"\x00\x01t");
-        packet.resize(packet.len() + size, number);
-        packet
-    }
-
-    /// Sizes of the payloads that were reported.
-    fn reported(inbox: &mut Inbox) -> Vec<usize> {
-        let mut sizes = Vec::new();
-        while let Some(occurrence) = inbox.ready().unwrap() {
-            if let Event::Packet {
-                packet: Packet::Publish { payload, .. },
-                ..
-            } = occurrence.event
-            {
-                sizes.push(payload.bytes().len());
-            }
-        }
-        sizes
-    }
-
-    #[tokio::test]
-    async fn all_bytes_go_on_and_all_packets_are_reported_in_order_however_they_come() {
-        let sizes: Vec<usize> = (0..40).map(|number| number * 90).collect();
-        let packets = sizes.iter().map(|size| publish(1, *size));
-        let sent = std::iter::once(CONNECT.to_vec())
-            .chain(packets)
-            .collect::<Vec<_>>()
-            .concat();
-        for (chunk, room) in [
-            (1, 1 << 16),
-            (7, 64),
-            (1_000, 64),
-            (1_000, 1 << 16),
-            (usize::MAX, 64),
-            (usize::MAX, 1 << 16),
-        ] {
-            let (shared, mut inbox) = shared();
-            let both = Both::default();
-            let mut pump = Pump::new(&shared, &both, 1, Direction::FromDevice);
-            let (mut device, from) = duplex(1 << 20);
-            let (to, mut broker) = duplex(room);
-            let send = async {
-                for part in sent.chunks(chunk) {
-                    device.write_all(part).await.unwrap();
-                    tokio::task::yield_now().await;
-                }
-                device.shutdown().await.unwrap();
-            };
-            let receive = async {
-                let mut got = Vec::new();
-                broker.read_to_end(&mut got).await.unwrap();
-                got
-            };
-            let ((), (), got) = tokio::join!(send, pump.run(from, to, shared.control.subscribe()), receive);
-            assert!(got == sent, "{chunk} bytes at once, room for {room}");
-            assert_eq!(reported(&mut inbox), sizes, "{chunk} bytes at once, room for {room}");
-        }
-    }
-
-    /// The device sends this, and the broker gets that.
-    async fn sends(ends: (&mut DuplexStream, &mut DuplexStream), packets: &[Vec<u8>], expected: &[u8]) {
-        let (device, broker) = ends;
-        device.write_all(&packets.concat()).await.unwrap();
-        let mut got = vec![0; expected.len()];
-        broker.read_exact(&mut got).await.unwrap();
-        assert_eq!(got, expected);
-    }
-
-    #[tokio::test]
-    async fn a_fault_takes_hold_of_the_next_packet_although_the_ones_before_ran_ahead() {
-        let (shared, mut inbox) = shared();
-        let both = Both::default();
-        let mut pump = Pump::new(&shared, &both, 1, Direction::FromDevice);
-        let (mut device, from) = duplex(1 << 16);
-        // Less than a packet: what is not taken at once goes on later.
-        let (to, mut broker) = duplex(16);
-        let talk = async {
-            sends((&mut device, &mut broker), &[CONNECT.to_vec()], CONNECT).await;
-            sends((&mut device, &mut broker), &[publish(1, 10)], &publish(1, 10)).await;
-            shared.faults.lock().unwrap().apply(&LinkFault::Drop {
-                topic: None,
-                count: 1,
-                direction: None,
-            });
-            sends(
-                (&mut device, &mut broker),
-                &[publish(2, 20), publish(3, 30)],
-                &publish(3, 30),
-            )
-            .await;
-            sends((&mut device, &mut broker), &[publish(4, 40)], &publish(4, 40)).await;
-            device.shutdown().await.unwrap();
-        };
-        tokio::join!(talk, pump.run(from, to, shared.control.subscribe()));
-        assert_eq!(reported(&mut inbox), [10, 20, 30, 40]);
-    }
-}
+mod tests;

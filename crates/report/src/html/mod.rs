@@ -28,6 +28,7 @@ pub use escape::Escape;
 use exploration_view::Grid;
 
 use super::fleet;
+use super::latency;
 use super::sources::Sources;
 use super::statement;
 use matrix::ChapterView;
@@ -123,6 +124,7 @@ fn thinned(
         capabilities: &result.capabilities,
         deviations: view::deviations(result, &anchors),
         settings: &result.settings,
+        latency: result.harness_latency.map_or_else(Vec::new, latency::rows),
         command: journal.map(command).unwrap_or_default(),
         has_journal: journal.is_some(),
         journal: &result.journal,
@@ -186,6 +188,7 @@ struct Page<'a> {
     capabilities: &'a [Capability],
     deviations: Vec<view::Deviation>,
     settings: &'a [Setting],
+    latency: Vec<latency::Row>,
     command: String,
     has_journal: bool,
     journal: &'a str,

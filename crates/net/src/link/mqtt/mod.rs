@@ -31,8 +31,8 @@ use options::ANSWER_LIMIT;
 use standing::{own_client, probe_topic, user};
 use tck_base::clock::{Moment, Stamp, WallClock};
 use tck_base::device::Publication;
-use tck_journal::Vantage;
 use tck_journal::event::{Event, LinkFault, Occurrence};
+use tck_journal::{Spread, Vantage};
 
 pub use crate::bench::inbox::Reporter;
 pub use options::{BenchInfo, BenchOptions, BrokerChoice};
@@ -277,6 +277,10 @@ impl Link for MqttLink {
             retain: false,
         })?;
         Ok(probe)
+    }
+
+    fn time_to_pass_on(&self) -> Option<Spread> {
+        self.reporter.time_to_pass_on()
     }
 
     async fn serve(&mut self, offer: Offer) -> Result<String, LinkError> {
