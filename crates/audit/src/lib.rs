@@ -38,6 +38,7 @@ pub mod slice;
 mod span;
 pub mod time_line;
 mod topics;
+mod turns;
 mod vehicle;
 
 use std::collections::BTreeMap;
