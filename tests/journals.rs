@@ -13,17 +13,20 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::Deserialize;
 use vda5050_tck::audit::{Options, own_run};
 use vda5050_tck::capture::{Item, Mapping, Recorded};
 use vda5050_tck::journal::file::JournalWriter;
-use vda5050_tck::judge::Library;
 use vda5050_tck::judge::judge;
-use vda5050_tck::pack::Role;
+use vda5050_tck::judge::{Library, Rules};
+use vda5050_tck::pack::{AssetFile, Assets, Catalogue, Role};
 use vda5050_tck::qualify::decided;
+use vda5050_tck::report::findings::{Finding, findings};
+use vda5050_tck::report::sources::Sources;
 use vda5050_tck::result::RunResult;
-use vda5050_tck::run::{VirtualRun, run_silently};
+use vda5050_tck::run::{Selection, VirtualRun, run_silently, sources};
 use vda5050_tck::verdict::{Accumulated, Verdict};
 
 /// The allocator of the program: a run is a million small trees.
@@ -219,4 +222,98 @@ fn the_journal_of_a_run_is_audited_like_the_run_was_judged() {
         }
         assert!(found > 0, "{role}: nothing was found that could be compared");
     }
+}
+
+/// The same rules, where no requirement rests on another one.
+fn resting_on_nothing(rules: &Rules) -> Rules {
+    let assets = vda5050_tck::embedded();
+    let files = assets.under("suites/requirements/").map(|file| {
+        let lines = file.text.lines();
+        let lines = lines.filter(|line| !line.trim_start().starts_with("rests-on:"));
+        AssetFile {
+            path: file.path.clone(),
+            text: lines.collect::<Vec<_>>().join("\n") + "\n",
+        }
+    });
+    let catalogue = Catalogue::load(&Assets::built_in(files)).unwrap_or_else(|all| panic!("{}", all[0]));
+    assert!(catalogue.all().all(|requirement| requirement.rests_on.is_empty()));
+    Rules {
+        catalogue: Arc::new(catalogue),
+        ..rules.clone()
+    }
+}
+
+/// Holds that every requirement has the verdict it has where nothing follows from anything, and that causes are told. Gives what
+/// follows from what.
+fn following(result: &RunResult, quoted: &Sources, name: &str) -> BTreeSet<(String, String)> {
+    let mut apart = quoted.clone();
+    for requirement in &mut apart.requirements {
+        requirement.rests_on.clear();
+    }
+    let verdicts = |all: &[Finding<'_>]| -> BTreeMap<String, Verdict> {
+        let all = all.iter();
+        all.map(|finding| (finding.requirement.to_owned(), finding.verdict))
+            .collect()
+    };
+    let told = findings(result, quoted);
+    assert_eq!(verdicts(&told), verdicts(&findings(result, &apart)), "{name}");
+    let mut following = BTreeSet::new();
+    for finding in &told {
+        if let Some(cause) = finding.follows {
+            let of_cause = told.iter().find(|other| other.requirement == cause);
+            let of_cause = of_cause.unwrap_or_else(|| panic!("{name}: {cause} is not told"));
+            assert!(of_cause.follows.is_none(), "{name}: {cause} is no cause");
+            assert!(of_cause.verdict >= finding.verdict, "{name}: {cause}");
+            following.insert((finding.requirement.to_owned(), cause.to_owned()));
+            continue;
+        }
+        let mut all = result.requirements.iter();
+        let known = all.find(|known| known.id == finding.requirement);
+        if finding.verdict == Verdict::Fail && known.is_some() {
+            let verdict = known.and_then(|known| known.verdict);
+            assert_eq!(verdict, Some(Verdict::Fail), "{name}: {}", finding.requirement);
+        }
+    }
+    following
+}
+
+#[test]
+fn no_verdict_changes_by_what_follows_from_what() {
+    let library = vda5050_tck::library(None).unwrap_or_else(|all| panic!("{}", all[0]));
+    let rules = &library.rules;
+    let apart = resting_on_nothing(rules);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/journals");
+    let kept = std::fs::read_dir(folder).expect("fixtures/journals");
+    let kept = kept.map(|entry| entry.expect("a folder").path());
+    for folder in kept.filter(|path| path.is_dir()) {
+        let name = folder.display().to_string();
+        let saved = vda5050_tck::journal::file::read(&folder.join("journal.jsonl")).expect("a journal");
+        let entries = saved.journal.entries();
+        let result = judge(rules, entries).expect("judged");
+        assert!(result == judge(&apart, entries).expect("judged"), "{name}");
+        let pack = rules.packs.get(&result.protocol).expect("a version");
+        following(&result, &sources(&library, pack), &name);
+    }
+}
+
+#[test]
+fn an_outdated_update_that_is_taken_over_is_one_mistake() {
+    let library = vda5050_tck::library(None).unwrap_or_else(|all| panic!("{}", all[0]));
+    let pack = library.rules.packs.latest();
+    let mut request = VirtualRun::of(&library, pack);
+    let mut tests = library.tests(Role::Agv, &pack.id);
+    tests.retain(|test| test.id.starts_with("order-rejection/lower-update-id"));
+    request.tests = Selection::some(tests);
+    request.faults.push("outdated-update-taken-over".to_owned());
+    let run = run_silently(&library, pack, request).expect("a run");
+    let quoted = sources(&library, pack);
+    let following = following(&run.result, &quoted, "an outdated update");
+    for requirement in ["STATE-12", "NODE-03"] {
+        let tie = (requirement.to_owned(), "ORD-REJ-10".to_owned());
+        assert!(following.contains(&tie), "{requirement}: {following:?}");
+    }
+    let told = findings(&run.result, &quoted);
+    let causes = told.iter().filter(|finding| finding.follows.is_none());
+    let causes: Vec<&str> = causes.map(|finding| finding.requirement).collect();
+    assert_eq!(causes, ["ORD-REJ-10"]);
 }

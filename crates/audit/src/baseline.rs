@@ -1,8 +1,9 @@
 //! An audit held against an earlier one: what was there before is no news.
 //!
 //! A finding is known when the baseline has one of the same vehicle and side, of the same requirement and monitor, that is at
-//! least as bad; where its sentence begins with a place in a message, such as `state/nodeStates/3/nodeId`, that place counts,
-//! too, whatever its numbers. How often it came, and in which words it is told, does not matter.
+//! least as bad, and about the same: where its sentence begins with a place in a message, such as `state/nodeStates/3/nodeId`, that
+//! is the place, whatever its numbers and the words behind it; elsewhere it is the sentence, whatever names and numbers, and how many
+//! of them, stand in it. How often it came does not matter.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -165,19 +166,13 @@ fn worst(result: &AuditResult) -> BTreeMap<Key<'_>, &FindingResult> {
     let mut all: BTreeMap<Key<'_>, &FindingResult> = BTreeMap::new();
     for (vehicle, side) in each(result) {
         for finding in &side.findings {
-            let place = cause::place(&finding.text);
-            let place = if place == finding.text {
-                String::new()
-            } else {
-                finding_group::of(place)
-            };
             let key = (
                 vehicle.manufacturer.as_str(),
                 vehicle.serial_number.as_str(),
                 side.role.as_str(),
                 finding.requirement.as_str(),
                 finding.monitor.as_str(),
-                place,
+                about(&finding.text),
             );
             let known = all.entry(key).or_insert(finding);
             if finding.verdict > known.verdict {
@@ -186,6 +181,17 @@ fn worst(result: &AuditResult) -> BTreeMap<Key<'_>, &FindingResult> {
         }
     }
     all
+}
+
+/// What a finding is about. A list is one thing, however long it is.
+fn about(text: &str) -> String {
+    let mut about = finding_group::of(cause::place(text));
+    for (several, one) in [("\"\", \"\"", "\"\""), ("#, #", "#")] {
+        while about.contains(several) {
+            about = about.replace(several, one);
+        }
+    }
+    about
 }
 
 /// Which monitor decided which requirement of whom.
@@ -235,7 +241,7 @@ fn notes(
     notes.extend(missing.map(|who| format!("the baseline judges {who}, and the recording does not show it")));
     if baseline.tool != result.tool {
         notes.push(format!(
-            "the baseline was made by {}, and this by {}",
+            "the baseline was made by {}, and this by {}: what is told in other words is new",
             line(&baseline.tool),
             line(&result.tool)
         ));
@@ -357,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn another_place_and_a_worse_verdict_are_news_and_other_words_are_none() {
+    fn another_place_and_a_worse_verdict_are_news() {
         let before = audited(&["horizon-not-reported"]);
         let change = |edit: &dyn Fn(&mut FindingResult)| {
             let mut after = before.clone();
@@ -368,11 +374,6 @@ mod tests {
             edit(&mut side.expect("a side").findings[0]);
             hold(&after, &before, "b").expect("a baseline")
         };
-        assert!(
-            change(&|finding| finding.text = "other words".to_owned())
-                .new
-                .is_empty()
-        );
         let placed = change(&|finding| finding.text = "state/orderId: 7 is not of type string".to_owned());
         assert_eq!(placed.new.len(), 1);
         let mut remark = before.clone();
@@ -383,6 +384,29 @@ mod tests {
         }
         let worse = hold(&before, &remark, "b").expect("a baseline");
         assert!(worse.new.iter().all(|told| told.before == Some(Verdict::Warning)) && !worse.new.is_empty());
+    }
+
+    #[test]
+    fn another_mistake_of_the_same_requirement_is_new_and_other_names_and_numbers_are_none() {
+        let told = |text: &str| {
+            let mut audit = audited(&["horizon-not-reported"]);
+            let mut sides = audit.vehicles[0].sides.iter_mut();
+            let side = sides.find(|side| !side.findings.is_empty()).expect("a side");
+            side.findings.truncate(1);
+            side.findings[0].text = text.to_owned();
+            audit.vehicles.truncate(1);
+            audit
+        };
+        let news = |before: &str, after: &str| {
+            let against = hold(&told(after), &told(before), "b").expect("a baseline");
+            (against.new.len(), against.gone.len())
+        };
+        let before = "nodes \"a\", \"b\" at 2, 4 are missing";
+        assert_eq!(news(before, "nodes \"d\" at 7 are missing"), (0, 0));
+        assert_eq!(news(before, "node \"a\" at 2 comes twice"), (1, 1));
+        let placed = "state/nodeStates/3/nodeId: 7 is not of type string";
+        assert_eq!(news(placed, "state/nodeStates/4/nodeId: null is none"), (0, 0));
+        assert_eq!(news(placed, "state/nodeStates/4/sequenceId: null is none"), (1, 1));
     }
 
     #[test]

@@ -106,6 +106,12 @@ impl<T> Sorted<T> {
         due
     }
 
+    /// The one that is held back for longest.
+    pub fn oldest(&self) -> Option<&T> {
+        let oldest = self.held.values().min_by_key(|(at, _)| *at);
+        oldest.map(|(_, message)| message)
+    }
+
     /// All that are held back, in their order.
     pub fn all(&mut self) -> Vec<T> {
         if let Some(last) = self.held.keys().next_back() {

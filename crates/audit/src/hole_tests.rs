@@ -1,6 +1,7 @@
 //! What outlasts a hole in a recording, and what does not.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
 
 use serde_json::{Value, json};
 
@@ -12,6 +13,8 @@ use tck_pack::Role;
 /// A vehicle that stands idle and its master control, as a recorder hears them.
 struct Heard {
     at: jiff::Timestamp,
+    /// The time between two messages.
+    pace: Duration,
     counts: BTreeMap<&'static str, u64>,
     messages: Vec<Message>,
 }
@@ -20,14 +23,15 @@ impl Heard {
     fn new() -> Self {
         Self {
             at: "2026-05-18T12:00:00Z".parse().expect("a time"),
+            pace: Duration::from_secs(1),
             counts: BTreeMap::new(),
             messages: Vec::new(),
         }
     }
 
-    /// Puts a message together that comes a second after the one before.
+    /// Puts a message together that comes after the one before.
     fn message(&mut self, topic: &'static str, members: Value, retain: bool) -> Message {
-        self.at += std::time::Duration::from_secs(1);
+        self.at += self.pace;
         let count = self.counts.entry(topic).or_default();
         let version = tck_testing::library().rules.packs.latest().version.to_string();
         let mut payload = json!({ "headerId": *count, "timestamp": format!("{:.2}", self.at), "version": version,
@@ -74,7 +78,7 @@ impl Heard {
 
     /// What comes next the recorder loses.
     fn loses(&mut self, topic: &'static str) -> &mut Self {
-        self.at += std::time::Duration::from_secs(1);
+        self.at += self.pace;
         *self.counts.entry(topic).or_default() += 1;
         self
     }
@@ -85,6 +89,19 @@ impl Heard {
             audit.observe(message.clone());
         }
         audit.finish(Vec::new())
+    }
+
+    /// The requirements that are told to be broken while it is heard, and that nothing takes back.
+    fn told(&self) -> BTreeSet<String> {
+        let audit = Audit::new(&tck_testing::library().rules, Options::default());
+        let mut audit = audit.expect("options").live();
+        let mut told = Vec::new();
+        for message in &self.messages {
+            audit.observe(message.clone());
+            told.extend(audit.news());
+        }
+        let fails = told.into_iter().filter(|found| found.verdict == Verdict::Fail);
+        fails.map(|found| found.requirement).collect()
     }
 }
 
@@ -254,4 +271,55 @@ fn every_monitor_that_did_not_judge_says_why_and_for_which_messages() {
     let (text, stretch) = why(&heard.audited(), Role::Agv, "state/remaining-route");
     assert!(text.starts_with("before the first state without an order"), "{text}");
     assert_eq!(stretch, Some((1, 4)));
+}
+
+#[test]
+fn a_restart_of_which_a_message_was_lost_is_known_before_the_states_behind_it() {
+    let told = |signs_off: bool| {
+        let mut done = idle();
+        done["orderId"] = "o1".into();
+        let mut heard = Heard::new();
+        heard.online().states(3);
+        let node = json!({ "nodeId": "n0", "sequenceId": 0, "released": true, "actions": [] });
+        heard.says(
+            "order",
+            json!({ "orderId": "o1", "orderUpdateId": 0, "nodes": [node], "edges": [] }),
+        );
+        heard.says("state", done.clone()).says("state", done);
+        if signs_off {
+            // OFFLINE does not reach the recorder, and ONLINE waits for it.
+            heard.loses("connection");
+            heard.pace = Duration::from_millis(1);
+            heard.online();
+        }
+        heard.states(2);
+        heard.pace = Duration::from_secs(1);
+        heard.states(3);
+        heard.told().contains("STATE-MSG-02")
+    };
+    assert!(told(false), "it forgot its order");
+    assert!(!told(true), "it may have been started anew");
+}
+
+#[test]
+fn a_factsheet_behind_one_that_was_lost_counts_for_the_command_after_it() {
+    let told = |knows: bool| {
+        let mut sheet = factsheet();
+        if knows {
+            let all = sheet["protocolFeatures"]["agvActions"].as_array_mut().expect("actions");
+            all.push(json!({ "actionType": "polishFloor", "actionScopes": ["INSTANT"] }));
+        }
+        let mut heard = Heard::new();
+        heard
+            .online()
+            .says("factsheet", factsheet())
+            .states(3)
+            .loses("factsheet");
+        heard.pace = Duration::from_millis(1);
+        heard.says("factsheet", sheet).commands("polishFloor", json!([]));
+        heard.pace = Duration::from_secs(1);
+        heard.states(3).told().contains("FACT-15")
+    };
+    assert!(told(false));
+    assert!(!told(true));
 }

@@ -42,6 +42,7 @@ mod stretched;
 pub mod time_line;
 pub mod time_stretch;
 mod topics;
+mod turns;
 mod vehicle;
 
 use std::collections::BTreeMap;

@@ -10,7 +10,7 @@ use super::arrived::{Arrived, timestamp, version};
 use super::conversation::{Concluded, Conversation};
 use super::courses::Courses;
 use super::covered::covered;
-use super::dedup::{Known, Sorted};
+use super::dedup::Known;
 use super::header::header;
 use super::hint::{Hint, Hints};
 use super::new_findings::Found;
@@ -20,6 +20,7 @@ use super::side::Side;
 use super::time_line::TimeLine;
 use super::time_stretch::TimeStretch;
 use super::topics::Named;
+use super::turns::Turns;
 use super::{AuditContext, is_command};
 use tck_base::clock::{Moment, Stamp};
 use tck_capture::Message;
@@ -63,7 +64,7 @@ pub(super) struct Vehicle {
     origin: Option<jiff::Timestamp>,
     now: Moment,
     known: Known,
-    sorted: BTreeMap<String, Sorted<Arrived>>,
+    turns: Turns,
     /// Topics of which something came.
     begun: BTreeSet<String>,
     waiting: Vec<Arrived>,
@@ -99,7 +100,7 @@ impl Vehicle {
             origin: None,
             now: Moment::START,
             known: Known::default(),
-            sorted: BTreeMap::new(),
+            turns: Turns::default(),
             begun: BTreeSet::new(),
             waiting: Vec::new(),
             conversation: Conversation::default(),
@@ -168,20 +169,7 @@ impl Vehicle {
         let stamped = (!self.timed).then(|| said.and_then(timestamp)).flatten();
         let at = self.stamp(message.at, stamped);
         arrived.at = at;
-        let mut due = Vec::new();
-        if self.timed {
-            for sorted in self.sorted.values_mut() {
-                due.extend(one_after_the_other(sorted.due(at.moment)));
-            }
-        }
-        if stale || !self.timed {
-            due.push(arrived);
-        } else {
-            let sorted = self.sorted.entry(name.to_owned()).or_default();
-            due.extend(one_after_the_other(sorted.take(id, at.moment, arrived)));
-        }
-        due.sort_by_key(|arrived| arrived.at.moment);
-        for arrived in due {
+        for arrived in self.turns.take(arrived, id, self.timed && !stale) {
             self.pass(arrived, scene);
         }
         true
@@ -216,10 +204,10 @@ impl Vehicle {
 
     /// Nothing was seen for a while.
     pub fn interrupted(&mut self, scene: AuditContext<'_>) {
-        for arrived in self.held() {
+        for arrived in self.turns.all() {
             self.pass(arrived, scene);
         }
-        self.sorted.clear();
+        self.turns.forget();
         self.conversation.interrupted(self.now, scene);
     }
 
@@ -230,13 +218,6 @@ impl Vehicle {
             news.append(&mut side.news);
         }
         news
-    }
-
-    /// All that are held back.
-    fn held(&mut self) -> Vec<Arrived> {
-        let mut rest: Vec<Arrived> = self.sorted.values_mut().flat_map(Sorted::all).collect();
-        rest.sort_by_key(|arrived| arrived.number);
-        rest
     }
 
     /// When a message came. Without a time of the recorder, what the message says of itself has to do.
@@ -428,7 +409,7 @@ impl Vehicle {
 
     /// Nothing comes any more that would say which version it speaks.
     pub fn ready(&mut self, scene: AuditContext<'_>) {
-        for arrived in self.held() {
+        for arrived in self.turns.all() {
             self.pass(arrived, scene);
         }
         if self.conversation.pack().is_none() && self.foreign.is_none() {
@@ -490,14 +471,4 @@ impl Vehicle {
             sides,
         }
     }
-}
-
-/// The messages of one topic in the order of their count: none came before the one that it follows.
-fn one_after_the_other(mut messages: Vec<Arrived>) -> Vec<Arrived> {
-    let mut last = Moment::default();
-    for arrived in &mut messages {
-        last = last.max(arrived.at.moment);
-        arrived.at.moment = last;
-    }
-    messages
 }

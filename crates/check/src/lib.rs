@@ -78,6 +78,8 @@ pub struct CheckFinding {
     pub seq: u64,
     /// One line.
     pub message: String,
+    /// The element of a list that it is about, by its id.
+    pub element: Option<String>,
 }
 
 /// A running check.

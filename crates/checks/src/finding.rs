@@ -14,6 +14,7 @@ pub(crate) fn broken(requirement: &str, seq: u64, message: impl Into<String>) ->
         verdict: None,
         seq,
         message: message.into(),
+        element: None,
     }
 }
 

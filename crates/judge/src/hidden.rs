@@ -3,11 +3,20 @@
 //! A state that forgets the name of its order, or leaves out actions that are done, cannot show what most tests wait
 //! for, nor can an instantActions message without its list. The device is guilty of that, once; whether it did what it
 //! was told could not be observed. A monitor names the members it speaks for under `hides:`, and what was missed there
-//! is inconclusive in the tests it found something in. Which monitors do so is data.
+//! is inconclusive in the tests it found something in. Which monitors do so is data. Where they name the elements that got lost, the
+//! others are seen.
 
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use serde_json::Value;
+
+use tck_base::pattern::Bindings;
 use tck_journal::Entry;
+use tck_journal::event::Event;
 use tck_result::{Sent, Waited};
-use tck_view::Topic;
+use tck_suite::model::{Step, Verb};
+use tck_view::{MessageView, Topic};
 
 use super::step::{Clause, ClauseOutcome, Timing};
 use super::timeline::Timeline;
@@ -32,6 +41,64 @@ pub(super) struct Open {
     pub of_time: Option<Timing>,
     /// The order that the vehicle still had when the last one was sent to it.
     pub busy: Option<OrderUnderWay>,
+    /// The actions of orders that were awaited by their ids, and no other actions.
+    pub awaits: BTreeSet<String>,
+}
+
+/// The actions of orders that a step awaits by their ids; none where it may be about instant actions, too.
+pub(super) fn awaited(
+    step: &Step,
+    bindings: &Bindings,
+    entries: &[Arc<Entry>],
+    timeline: &Timeline,
+) -> BTreeSet<String> {
+    let mut named = BTreeSet::new();
+    let mut texts = BTreeSet::new();
+    if matches!(*step.verb, Verb::Expect(_)) {
+        step.visit_terms(&mut |term| {
+            if let Ok(value) = term.bind(bindings) {
+                gather(value, &mut texts);
+            }
+        });
+    }
+    for entry in entries
+        .iter()
+        .filter(|entry| matches!(entry.event(), Event::Sent { .. }))
+    {
+        let topic = timeline
+            .place(entry)
+            .map_or(Topic::Other, |owner| Topic::of_name(&owner.name));
+        match timeline.view(entry, topic) {
+            Some(MessageView::Order(order)) => {
+                let ids = order.actions().filter_map(|(_, action)| action.action_id.text());
+                named.extend(ids.filter(|id| texts.contains(*id)).map(str::to_owned));
+            }
+            Some(MessageView::InstantActions(message)) => {
+                let mut all = message.all_actions();
+                let is_named = all.any(|action| {
+                    let words = [action.action_id.text(), action.action_type.text()];
+                    words.into_iter().flatten().any(|word| texts.contains(word))
+                });
+                if is_named {
+                    return BTreeSet::new();
+                }
+            }
+            _ => {}
+        }
+    }
+    named
+}
+
+/// All texts of a value.
+fn gather(value: Value, texts: &mut BTreeSet<String>) {
+    match value {
+        Value::String(text) => {
+            texts.insert(text);
+        }
+        Value::Array(items) => items.into_iter().for_each(|item| gather(item, texts)),
+        Value::Object(members) => members.into_iter().for_each(|(_, member)| gather(member, texts)),
+        _ => {}
+    }
 }
 
 /// An order of which nodes were left when another one was sent.
@@ -73,6 +140,8 @@ pub(super) struct Hidden {
     pub seq: u64,
     /// It is known from before this test: where the member shows nothing, it shows nothing in any message.
     pub lasting: bool,
+    /// The elements of the member that got lost, by their ids; `None` where it may be any.
+    pub elements: Option<BTreeSet<String>>,
 }
 
 impl Hidden {
@@ -96,7 +165,15 @@ impl Hidden {
             && member == Some(self.member.as_str())
             && !self.decides.iter().any(|id| about.contains(id))
             && self.seq <= open.ended
+            && self.may_be(&open.awaits)
             && !(open.refused && open.clause.holds == ClauseOutcome::Violated && open.clause.witness.is_none())
+    }
+
+    /// Whether what got lost may be what was awaited. An action of an order is listed as soon as the order is taken, so that it is missing
+    /// by itself; an instant action may be over, and lost, before a state shows it.
+    fn may_be(&self, awaited: &BTreeSet<String>) -> bool {
+        let lost = self.elements.as_ref().filter(|_| !awaited.is_empty());
+        lost.is_none_or(|lost| !lost.is_disjoint(awaited))
     }
 }
 
@@ -186,6 +263,7 @@ mod tests {
             of_time: None,
             refused: false,
             busy: None,
+            awaits: BTreeSet::new(),
         }
     }
 
@@ -201,6 +279,7 @@ mod tests {
             decides: vec!["STATE-MSG-02".to_owned()],
             seq: found,
             lasting: false,
+            elements: None,
         }];
         hide(all, &hidden);
         matches!(all[0].clause.holds, ClauseOutcome::Unobservable(_))
@@ -220,6 +299,33 @@ mod tests {
         let mut came = clause("ORD-06", "orderId");
         came.clause.witness = Some(20);
         assert!(!is_hidden(came, 15));
+    }
+
+    #[test]
+    fn the_loss_of_one_action_hides_no_other_one_of_an_order() {
+        let unseen = |lost: Option<&[&str]>, awaited: &[&str]| {
+            let of = |all: &[&str]| all.iter().map(|id| (*id).to_owned()).collect::<BTreeSet<_>>();
+            let hidden = [Hidden {
+                member: "actionStates".to_owned(),
+                monitor: "state/action-states-kept".to_owned(),
+                requirement: "STATE-MSG-10".to_owned(),
+                decides: vec!["STATE-MSG-10".to_owned()],
+                seq: 15,
+                lasting: false,
+                elements: lost.map(of),
+            }];
+            let mut open = clause("ASTATE-01", "actionStates");
+            open.awaits = of(awaited);
+            let mut all = [open];
+            hide(&mut all, &hidden);
+            matches!(all[0].clause.holds, ClauseOutcome::Unobservable(_))
+        };
+        assert!(!unseen(Some(&["cancel"]), &["later"]));
+        assert!(unseen(Some(&["cancel", "later"]), &["later"]));
+        assert!(unseen(Some(&["first"]), &["first", "later"]));
+        // It is not known what got lost, or what is awaited.
+        assert!(unseen(None, &["later"]));
+        assert!(unseen(Some(&["cancel"]), &[]));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! A monitor's findings are kept once per requirement and verdict, with a count and the first occurrences,
 //! not as noise in every test.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use serde_json::Map;
@@ -26,6 +27,8 @@ use tck_world::{End, Listen, Listens, Observation, World};
 
 /// How many occurrences of a finding are kept by number.
 pub(super) const FIRST: usize = 5;
+/// How many elements that do not show themselves are told apart in a test.
+const ELEMENTS: usize = 4096;
 /// How many different findings a monitor keeps.
 const DIFFERENT: usize = 64;
 
@@ -39,12 +42,34 @@ pub struct MonitorJudge {
     findings: Vec<MonitorFinding>,
     /// Why it cannot be judged, though it should be: a variable without a value.
     open: Option<String>,
-    /// The first fail since the running test began: requirement and entry.
-    broken: Option<(String, u64)>,
+    /// What fails since the running test began.
+    broken: Option<Broken>,
     /// The requirement of the first fail of the run.
     accuses: Option<String>,
     /// Whether findings that say different things are kept apart: they are taken after each entry.
     apart: bool,
+}
+
+/// What a monitor that hides members has failed in a test.
+struct Broken {
+    /// The first requirement.
+    requirement: String,
+    /// The entry that showed it first.
+    seq: u64,
+    /// The elements that all of it is about; `None` when it is about more than those, or nobody knows.
+    elements: Option<BTreeSet<String>>,
+}
+
+impl Broken {
+    /// Takes in a further finding.
+    fn also(&mut self, element: Option<&String>) {
+        match (&mut self.elements, element) {
+            (Some(elements), Some(element)) if elements.len() < ELEMENTS => {
+                elements.insert(element.clone());
+            }
+            _ => self.elements = None,
+        }
+    }
 }
 
 /// A message without which nothing is known of a requirement.
@@ -239,6 +264,7 @@ impl MonitorJudge {
                         verdict: None,
                         seq: entry.seq(),
                         message: miss(pattern, &message, *forbidden),
+                        element: None,
                     });
                 }
             }
@@ -316,8 +342,13 @@ impl MonitorJudge {
                 ),
                 _ => (verdict, finding.message),
             };
-            if verdict == Verdict::Fail && self.broken.is_none() && !self.monitor.hides.is_empty() {
-                self.broken = Some((id.as_str().to_owned(), finding.seq));
+            if verdict == Verdict::Fail && !self.monitor.hides.is_empty() {
+                let broken = self.broken.get_or_insert_with(|| Broken {
+                    requirement: id.as_str().to_owned(),
+                    seq: finding.seq,
+                    elements: Some(BTreeSet::new()),
+                });
+                broken.also(finding.element.as_ref());
                 self.accuses.get_or_insert_with(|| id.as_str().to_owned());
             }
             let is_full = self.findings.len() >= DIFFERENT;
@@ -369,7 +400,7 @@ impl MonitorJudge {
 
     /// What shows nothing in the running test for what was found in it.
     pub(super) fn hidden(&self) -> Vec<Hidden> {
-        let Some((requirement, seq)) = &self.broken else {
+        let Some(broken) = &self.broken else {
             return Vec::new();
         };
         let decides = self.monitor.checks.iter();
@@ -379,10 +410,11 @@ impl MonitorJudge {
             .map(|member| Hidden {
                 member: member.clone(),
                 monitor: self.monitor.id.clone(),
-                requirement: requirement.clone(),
+                requirement: broken.requirement.clone(),
                 decides: decides.clone(),
-                seq: *seq,
+                seq: broken.seq,
                 lasting: false,
+                elements: broken.elements.clone(),
             })
             .collect()
     }

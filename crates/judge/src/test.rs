@@ -13,7 +13,7 @@ use super::declined::{Declined, is_an_answer};
 use super::disconnect::Disconnect;
 use super::eval_context::EvalContext;
 use super::gone::Gone;
-use super::hidden::{Hidden, Open, OrderUnderWay, excuse_busy, hide};
+use super::hidden::{Hidden, Open, OrderUnderWay, awaited, excuse_busy, hide};
 use super::own_errors::{is_refused, reported};
 use super::run_contexts::Ground;
 use super::sent::sent;
@@ -335,6 +335,8 @@ impl TestJudge {
                 since: self.mark,
                 messages: outcome.seen,
             };
+            let is_missed = outcome.clauses.iter().any(|clause| clause.nearest.is_some());
+            let awaits = is_missed.then(|| awaited(&step, &self.bindings, &self.entries, timeline));
             for mut clause in outcome.clauses {
                 if owed {
                     clause.word = "owes";
@@ -365,6 +367,7 @@ impl TestJudge {
                     of_time,
                     refused: ground.role == Role::Agv && is_refused(timeline, self.mark),
                     busy: self.busy.clone(),
+                    awaits: awaits.clone().unwrap_or_default(),
                 });
             }
         }

@@ -229,6 +229,7 @@ mod tests {
             verdict,
             seq,
             message: format!("found at {seq}"),
+            element: None,
         }
     }
 

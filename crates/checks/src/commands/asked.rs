@@ -65,6 +65,7 @@ impl Running for NotAsked {
                     verdict: None,
                     seq: record.seq(),
                     message: format!("the instant action {} comes", quote(kind)),
+                    element: None,
                 });
             }
         }

@@ -43,6 +43,7 @@ fn found(seq: u64, message: String) -> CheckFinding {
         verdict: None,
         seq,
         message,
+        element: None,
     }
 }
 

@@ -232,6 +232,10 @@ impl Kept {
         findings: &mut Vec<CheckFinding>,
     ) {
         let seq = record.seq();
+        let gone = |requirement: &str, text: String| CheckFinding {
+            element: Some(id.to_owned()),
+            ..broken(requirement, seq, text)
+        };
         let text = format!(
             "action {} was {status} and is gone, although no new order was accepted",
             quote(id)
@@ -246,12 +250,12 @@ impl Kept {
             return;
         }
         if cancelled && !self.instant.iter().any(|instant| instant == id) {
-            findings.push(broken("ORD-CANCEL-12", seq, text.clone()));
+            findings.push(gone("ORD-CANCEL-12", text.clone()));
         }
         if !self.graph.terminal(status) {
-            findings.push(broken("STATE-MSG-09", seq, text.clone()));
+            findings.push(gone("STATE-MSG-09", text.clone()));
         }
-        findings.push(broken("STATE-MSG-10", seq, text));
+        findings.push(gone("STATE-MSG-10", text));
     }
 
     fn factsheet_limit(record: &Observation<'_>) -> Option<usize> {
@@ -395,7 +399,9 @@ mod tests {
             .instant("cancelOrder", "x", &json!([]))
             .state(&actions(&[("a", "FAILED"), ("p", "FINISHED"), ("x", "FINISHED")]))
             .state(&actions(&[("a", "FAILED"), ("x", "FINISHED")]));
-        assert_eq!(trace.judge("state/action-states-kept").summary(), ["STATE-MSG-10"]);
+        let judged = trace.judge("state/action-states-kept");
+        assert_eq!(judged.summary(), ["STATE-MSG-10"]);
+        assert_eq!(judged.findings[0].element.as_deref(), Some("p"));
     }
 
     #[test]

@@ -440,6 +440,7 @@ fn hidden(watches: &MonitorSet, waivers: &[Waiver]) -> Vec<Hidden> {
         decides: waiver.about.clone(),
         seq: 0,
         lasting: true,
+        elements: None,
     }));
     all
 }

@@ -72,6 +72,9 @@ records! {
     fault "timestamp-milliseconds" ["HDR-03"] "Gives the fraction of a second with three digits."
         because "The ruling of HDR-03 makes another number of digits of the fraction a warning."
         => header(|agv, _, h| h.set("timestamp", format!("{:.3}", agv.now.utc)));
+    fault "clock-drifts" ["HDR-03"] "Its clock is ten minutes ahead, and gains a second in a hundred."
+        because "A clock that is far from that of the harness is a warning by HDR-03."
+        => header(|agv, _, h| h.set("timestamp", drifting(agv)));
     fault "version-short" ["HDR-04"] "Gives the protocol version without the patch number."
         => header(|_, _, h| text(h, "version", |own| own.rsplit_once('.').map_or(own, |(short, _)| short).to_owned()));
     fault "factsheet-version-prefixed" ["HDR-04"] "The version in the header of its factsheet begins with the letter V."
@@ -82,6 +85,13 @@ records! {
 fn in_an_hour(agv: &Agv) -> String {
     let hour = jiff::SignedDuration::from_hours(1);
     format!("{:.2}", agv.now.utc.checked_add(hour).unwrap_or(agv.now.utc))
+}
+
+/// The time of a clock that is ten minutes ahead, and gains a second in a hundred.
+fn drifting(agv: &Agv) -> String {
+    let gained = agv.now.moment.since(tck_base::clock::Moment::START).as_secs() / 100;
+    let ahead = jiff::SignedDuration::from_secs(600 + i64::try_from(gained).unwrap_or_default());
+    format!("{:.2}", agv.now.utc.checked_add(ahead).unwrap_or(agv.now.utc))
 }
 
 /// A text in upper case, or in lower case where it is in upper case already.
