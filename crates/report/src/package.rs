@@ -41,6 +41,9 @@ pub enum PackageError {
     /// The package would lie in the bundle, which would not be what its manifest says any more.
     #[error("the package would lie in the bundle that it packs; name a file elsewhere")]
     Inside,
+    /// Something else than a file is there, such as a pipe or a link, and is not replaced.
+    #[error("{} is there and is no regular file; name another one", .0.display())]
+    NoFile(PathBuf),
     /// A paper cannot be written.
     #[error("cannot write the papers: {0}")]
     Paper(String),
@@ -128,6 +131,9 @@ impl Package<'_> {
         let bundle = self.folder.canonicalize().map_err(failed(self.folder))?;
         if place.starts_with(&bundle) {
             return Err(PackageError::Inside);
+        }
+        if std::fs::symlink_metadata(file).is_ok_and(|facts| !facts.is_file()) {
+            return Err(PackageError::NoFile(file.to_owned()));
         }
         std::fs::create_dir_all(beside).map_err(failed(beside))?;
         let papers = self.papers()?;

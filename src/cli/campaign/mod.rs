@@ -10,6 +10,7 @@ use clap::Parser as _;
 use super::args::{Campaign as Arguments, Cli, Format};
 use super::exit::Exit;
 use super::problem::Problem;
+use super::within;
 use crew::{Crew, Job};
 use tck_base::diagnostic::{Diagnostic, Source};
 use tck_campaign::{Line, Place, PlaceError, Plan, Settled, Stand, Summary};
@@ -19,6 +20,7 @@ use tck_run::write_whole;
 pub fn campaign(arguments: &Arguments) -> Result<Exit, Problem> {
     let plan = read(&arguments.file)?;
     let root = folder(arguments, &plan);
+    within::refuse_folder("out", &root)?;
     std::fs::create_dir_all(&root).map_err(|error| unwritable(&root, &error))?;
     // What the events of a run name is found from everywhere.
     let root = std::path::absolute(&root).map_err(|error| unwritable(&root, &error))?;
