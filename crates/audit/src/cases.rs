@@ -4,6 +4,7 @@ use super::join::restricted;
 use super::mistakes::Mistake;
 use super::result::{AuditResult, FindingResult, SideResult, VehicleResult};
 use tck_base::verdict::Verdict;
+use tck_report::cases::Elsewhere;
 use tck_report::junit::Plain;
 
 /// A side of a vehicle, for people.
@@ -33,7 +34,8 @@ pub(super) fn cases(result: &AuditResult) -> Vec<Plain> {
                     suite: suite.clone(),
                     name: decided.id.clone(),
                     // A build server counts mistakes, so what follows from one is shown beside it and counts for none.
-                    verdict: cause.is_none().then_some(decided.verdict),
+                    verdict: decided.verdict,
+                    elsewhere: cause.map(|_| Elsewhere::Cause),
                     text: match cause {
                         Some(cause) => format!("follows from {cause}: {}", texts.join("\n")),
                         None => texts.join("\n"),
@@ -46,7 +48,8 @@ pub(super) fn cases(result: &AuditResult) -> Vec<Plain> {
         all.push(Plain {
             suite: "audit".to_owned(),
             name: "something was judged".to_owned(),
-            verdict: Some(Verdict::Error),
+            verdict: Verdict::Error,
+            elsewhere: None,
             text: "nothing was judged".to_owned(),
         });
     }
@@ -54,7 +57,8 @@ pub(super) fn cases(result: &AuditResult) -> Vec<Plain> {
         all.push(Plain {
             suite: "audit".to_owned(),
             name: name.to_owned(),
-            verdict: Some(verdict),
+            verdict,
+            elsewhere: None,
             text,
         });
     }
