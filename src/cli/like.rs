@@ -61,9 +61,10 @@ impl Harness {
 
     /// What the record of the run says.
     pub(super) fn setting(&self) -> Option<Setting> {
-        self.0
-            .as_ref()
-            .map(|like| Setting::shown(SETTING, like.name.as_str(), "flag"))
+        self.0.as_ref().map(|like| {
+            let effect = if like.in_run().is_empty() { " (no effect)" } else { "" };
+            Setting::shown(SETTING, format!("{}{effect}", like.name), "flag")
+        })
     }
 
     /// Lets the mock vehicles behave so.

@@ -20,7 +20,7 @@ use tck_journal::place;
 use tck_judge::Library;
 use tck_pack::{Catalogue, Role};
 use tck_profile as profile;
-use tck_report::statement::many;
+use tck_report::statement::{many, verb};
 use tck_report::{clean, json as result_file};
 
 /// A file that is read as a whole may have so many bytes.
@@ -183,7 +183,7 @@ fn check(name: &str, bytes: &[u8], path: &Path, judging: &Judging<'_>) -> Result
         let format = member("format").map(|range| String::from_utf8_lossy(&json[range]));
         if format.is_some_and(|format| format.contains(".result/")) {
             return Ok(match result_file::from_str(&String::from_utf8_lossy(json), name) {
-                Ok(result) => Found::Good(format!("a result of {} tests", result.tests.len())),
+                Ok(result) => Found::Good(format!("a result of {}", many(result.tests.len(), "test"))),
                 Err(error) => Found::Bad(vec![Diagnostic::whole("result", error.to_string())]),
             });
         }
@@ -238,9 +238,8 @@ fn beside_tests(name: &str, text: &str, path: &Path, library: &Library) -> Optio
         .find(|role| folder.ends_with(Path::new("explore").join(role.word())));
     let read = match role {
         _ if has("explore:") => Grammar::read(name, text).map(|_| "a grammar of conversations".to_owned()),
-        Some(role) => {
-            Grammar::check_part(&library.assets, role, name, text).map(|count| format!("a file of {count} stimuli"))
-        }
+        Some(role) => Grammar::check_part(&library.assets, role, name, text)
+            .map(|count| format!("a file of {count} {}", verb(count, "stimulus", "stimuli"))),
         None => return None,
     };
     Some(read.map_err(|error| vec![Diagnostic::whole("explore", error.to_string())]))

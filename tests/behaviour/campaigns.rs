@@ -172,7 +172,7 @@ fn a_campaign_that_is_killed_with_its_run_goes_on_where_it_was() {
     bench
         .run(&["campaign", "c.toml"])
         .code(0)
-        .says("1 of 3 runs were carried out before")
+        .says("1 of 3 runs was carried out before")
         .says("reference/second: goes on");
     let expected = [("first", 1), ("second", 2), ("third", 1)];
     let expected = expected.map(|(name, runs)| (format!("reference/{name}"), json!(0), json!(runs)));

@@ -6,6 +6,7 @@ use super::result::{AuditResult, FindingResult, SideResult, VehicleResult};
 use tck_base::verdict::Verdict;
 use tck_report::cases::Elsewhere;
 use tck_report::junit::Plain;
+use tck_report::statement::times;
 
 /// A side of a vehicle, for people.
 pub(super) fn named(vehicle: &VehicleResult, side: &SideResult) -> String {
@@ -83,8 +84,11 @@ fn cause_of<'m>(id: &str, mistakes: &[Mistake<'m>]) -> Option<&'m str> {
 fn sentence(finding: &FindingResult, result: &AuditResult) -> String {
     let place = place(finding, result);
     format!(
-        "{} times at {place}, first {}, last {}: {}",
-        finding.count, finding.first, finding.last, finding.text
+        "{} at {place}, first {}, last {}: {}",
+        times(finding.count),
+        finding.first,
+        finding.last,
+        finding.text
     )
 }
 

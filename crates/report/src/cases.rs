@@ -247,11 +247,11 @@ fn of_monitor<'a>(monitor: &'a MonitorResult, told: bool, sources: &'a Sources) 
     let lines = findings.iter().map(|finding| {
         let first: Vec<String> = finding.first.iter().map(|seq| format!("#{seq}")).collect();
         format!(
-            "{}: {}: {} ({} times; first at {})",
+            "{}: {}: {} ({}; first at {})",
             finding.verdict,
             finding.requirement,
             finding.message,
-            finding.count,
+            statement::times(finding.count),
             first.join(", ")
         )
     });

@@ -13,7 +13,7 @@ use tokio::sync::watch;
 use super::super::ending;
 use super::super::problem::Problem;
 use tck_campaign::{Entry, Place, PlaceError, Settled, Stand};
-use tck_report::statement::many;
+use tck_report::statement::{many, verb};
 
 /// How often it is looked whether a run has ended.
 const LOOK: Duration = Duration::from_millis(50);
@@ -136,8 +136,9 @@ impl Crew {
         let done = self.jobs.iter().filter(|job| job.settled().is_some()).count();
         if done > 0 {
             super::super::tell(&format!(
-                "{done} of {} were carried out before",
-                many(self.jobs.len(), "run")
+                "{done} of {} {} carried out before",
+                many(self.jobs.len(), "run"),
+                verb(done, "was", "were")
             ));
         }
         Ok(())
