@@ -262,16 +262,30 @@ fn one(name: &str, bytes: &[u8], judging: &Judging<'_>) -> Result<Found, Problem
     })
 }
 
+/// How many of some things are used: `4 nodes`, or `3 of 4 nodes`.
+fn part_of(used: usize, all: usize, one: &str) -> String {
+    if used < all {
+        format!("{used} of {}", many(all, one))
+    } else {
+        many(used, one)
+    }
+}
+
 /// Reads a layout for each of its vehicle types: which one is meant is said by the profile that uses it. Gives what it is, and
 /// what looks wrong in it.
 fn layout(source: &Arc<Source>) -> Result<(String, Vec<String>), Vec<Diagnostic>> {
     let (mut said, mut left_out, mut doubts) = (Vec::new(), Vec::new(), Vec::new());
+    let (all_nodes, all_edges) = Layout::written_in(source)?;
     for vehicle_type in Layout::vehicle_types(source)? {
         let whole = Layout::from_lif(source, Some(&vehicle_type))?;
         let layout = whole.fitted(&Unheard);
         let shown = escaped(&vehicle_type);
         let (nodes, edges) = (layout.nodes().count(), layout.edges().count());
-        said.push(format!("{nodes} nodes and {edges} edges for {vehicle_type}"));
+        said.push(format!(
+            "{} and {} for {vehicle_type}",
+            part_of(nodes, all_nodes, "node"),
+            part_of(edges, all_edges, "edge")
+        ));
         let unused = layout.left_out().iter();
         left_out.extend(unused.map(|sentence| format!("\n  not used for {vehicle_type}: {}", escaped(sentence))));
         let unread = whole.unsaid().iter();

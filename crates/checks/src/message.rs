@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 
 use serde_json::Value;
 
-use crate::finding::{broken, quote, remark};
+use crate::finding::{broken, number, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::json::JsonProblem;
 use tck_pack::{Finding, FindingKind, MessageSchema, Pack};
@@ -405,7 +405,10 @@ fn beyond_full(state: &StateView, names: &Names, seq: u64) -> Option<CheckFindin
         names.name(StateView::battery_state)?,
         names.name(BatteryState::battery_charge)?,
     );
-    let text = format!("state/{object}/{member}: {charge} is not between 0 and 100 percent");
+    let text = format!(
+        "state/{object}/{member}: {} is not between 0 and 100 percent",
+        number(charge)
+    );
     let is_one = (-ROUNDED..=100.0 + ROUNDED).contains(&charge);
     (!is_one).then(|| remark("STATE-MSG-15", seq, text))
 }
