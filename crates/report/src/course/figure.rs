@@ -71,7 +71,7 @@ impl CoursePicture {
         });
         let (before, after) = self.parted();
         let driven = [
-            (LineKind::After, after, "where the vehicle drove after finding 1"),
+            (LineKind::After, after, "where the vehicle drove after arrow 1"),
             (LineKind::Trail, before, "where the vehicle drove"),
         ];
         let driven = driven.into_iter().filter(|(_, points, _)| points.len() > 1);
@@ -225,7 +225,7 @@ impl CoursePicture {
         };
         let (_, after) = self.parted();
         if after.len() > 1 {
-            text.push_str(&format!("; {} m of it after finding 1", metres(length(&after))));
+            text.push_str(&format!("; {} m of it after arrow 1", metres(length(&after))));
         }
         if self.by_nodes {
             text.push_str("; the vehicle does not say where it is, its last nodes are drawn");

@@ -131,11 +131,11 @@ fn the_worst_finding_lies_on_top_and_those_at_its_place_are_named_with_it() {
         .map(|(number, _)| number)
         .collect();
     assert_eq!(numbers, ["2", "1, 3"]);
-    assert!(figure.contains("m of it after finding 1"), "{figure}");
+    assert!(figure.contains("m of it after arrow 1"), "{figure}");
     assert!(figure.find("class=\"after\"") < figure.find("class=\"trail\""));
     picture.until = None;
     let whole = picture.figure("c", "t", |_| false).expect("a figure");
-    assert!(!whole.contains("class=\"after\"") && !whole.contains("m of it after finding 1"));
+    assert!(!whole.contains("class=\"after\"") && !whole.contains("m of it after arrow 1"));
 }
 
 #[test]
