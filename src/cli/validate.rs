@@ -107,8 +107,10 @@ pub fn validate(arguments: &Validate) -> Result<Exit, Problem> {
 fn summary(name: &str, counted: Counted, format: Format) -> Result<(), Problem> {
     let text = match format {
         Format::Text => format!(
-            "{name}: {} messages, {} with violations, {} with warnings\n",
-            counted.messages, counted.wrong, counted.warned
+            "{name}: {}, {} with violations, {} with warnings\n",
+            many(counted.messages, "message"),
+            counted.wrong,
+            counted.warned
         ),
         Format::Json => format!(
             "{}\n",
