@@ -14,15 +14,20 @@ const OWN_SUITES: &str = "VDA5050_TCK_SUITES";
 
 /// `certify`.
 pub fn certify(arguments: &args::Certify, outputs: &Outputs<'_>) -> Result<Exit, Problem> {
-    let surroundings = Surroundings::of_process();
+    let run = as_run(arguments, &Surroundings::of_process())?;
+    super::run::run_command(&run, outputs)
+}
+
+/// The run that a certification is, if the profile has all that a certificate takes.
+pub(super) fn as_run(arguments: &args::Certify, surroundings: &Surroundings) -> Result<args::Run, Problem> {
     let said = arguments.certificate.settings();
     let hooks = Hooks::load(&crate::embedded())?;
-    let effective = profile::load(arguments.profile.as_deref(), &said, &surroundings, &hooks)?;
-    let missing = missing(&effective, &surroundings);
+    let effective = profile::load(arguments.profile.as_deref(), &said, surroundings, &hooks)?;
+    let missing = missing(&effective, surroundings);
     if !missing.is_empty() {
         return Err(Problem::Usage(missing));
     }
-    let run = args::Run {
+    Ok(args::Run {
         certifies: true,
         said,
         device: args::DeviceArgs {
@@ -41,8 +46,7 @@ pub fn certify(arguments: &args::Certify, outputs: &Outputs<'_>) -> Result<Exit,
         certificate: true,
         shard: arguments.shard,
         ..args::Run::default()
-    };
-    super::run::run_command(&run, outputs)
+    })
 }
 
 /// What stands in the way of a certificate, and can be seen in the profile alone.

@@ -48,7 +48,13 @@ pub fn discover(arguments: &Discover) -> Result<Exit, Problem> {
             });
             let mut text: String = described.collect();
             if heard.others > 0 {
-                let _ = writeln!(text, "{} messages of no device were heard as well", heard.others);
+                let _ = writeln!(
+                    text,
+                    "{} {} of no device {} heard as well",
+                    heard.others,
+                    if heard.others == 1 { "message" } else { "messages" },
+                    if heard.others == 1 { "was" } else { "were" }
+                );
             }
             super::print(&text)?
         }

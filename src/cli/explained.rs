@@ -100,7 +100,7 @@ fn requirement(known: &Requirement, library: &Library, pack: &Pack) -> Value {
         .collect();
     json!({ "kind": "requirement", "id": id, "chapter": known.chapter, "text": known.text, "role": known.role.word(),
         "versions": versions, "inVersion": known.in_version(pack).is_some(), "interpretation": known.interpretation,
-        "because": known.because, "otherwise": known.otherwise,
+        "because": known.because, "otherwise": known.otherwise, "restsOn": known.rests_on,
         "decided": known.decided.word(), "tests": by, "monitors": monitors, "provedWith": proved,
         "repeat": repetitions(id, library) })
 }

@@ -131,7 +131,7 @@ pub fn package(folder: &Path, library: &Library, file: &Path, format: Format) ->
         super::print(&text)?;
     }
     let papers = package.write(file).map_err(|error| match error {
-        PackageError::Inside => Problem::from(Diagnostic::whole("usage", error.to_string())),
+        PackageError::Inside | PackageError::NoFile(_) => Problem::from(Diagnostic::whole("usage", error.to_string())),
         error => Problem::Environment(error.to_string()),
     })?;
     let shown = file.display().to_string();

@@ -39,7 +39,12 @@ pub(super) struct Harness(Option<Counterpart>);
 impl Harness {
     /// As the command line asks for, when a device of this role is tested. What the run takes of the counterpart, and that it
     /// did, is noted in the request.
-    pub(super) fn of_run(like: Option<&str>, tested: Role, request: &mut Request) -> Result<Self, Problem> {
+    pub(super) fn of_run(
+        like: Option<&str>,
+        tested: Role,
+        request: &mut Request,
+        tell: &dyn Fn(&str),
+    ) -> Result<Self, Problem> {
         let other_side = match tested {
             Role::Agv => Role::MasterControl,
             Role::MasterControl => Role::Agv,
@@ -47,7 +52,7 @@ impl Harness {
         let like = named(like, other_side)?;
         if let Some(like) = &like {
             let limit = like.limit();
-            super::tell(&format!("{limit} `vda5050-tck list counterparts` shows its habits."));
+            tell(&format!("{limit} `vda5050-tck list counterparts` shows its habits."));
             request.limits.push(limit);
             request.manners = like.manners();
         }
@@ -56,9 +61,10 @@ impl Harness {
 
     /// What the record of the run says.
     pub(super) fn setting(&self) -> Option<Setting> {
-        self.0
-            .as_ref()
-            .map(|like| Setting::shown(SETTING, like.name.as_str(), "flag"))
+        self.0.as_ref().map(|like| {
+            let effect = if like.in_run().is_empty() { " (no effect)" } else { "" };
+            Setting::shown(SETTING, format!("{}{effect}", like.name), "flag")
+        })
     }
 
     /// Lets the mock vehicles behave so.

@@ -16,6 +16,7 @@ use tck_pack::{Pack, Requirement, Role};
 use tck_profile::VEHICLE_WORDS;
 use tck_reference::Fault;
 use tck_report::coverage;
+use tck_report::statement::{many, verb};
 use tck_run::sources;
 use tck_simulate::BuiltIn;
 use tck_suite::model::{Monitor, Rule, Test, Verb};
@@ -256,8 +257,9 @@ fn tests(all: &[Arc<Test>], role: Role) -> String {
         };
         let _ = writeln!(
             text,
-            "\n{} tests for role {role}, {moving} of them move the vehicle{more}\n",
-            written.len()
+            "\n{} for role {role}, {moving} of them {} the vehicle{more}\n",
+            many(written.len(), "test"),
+            verb(moving, "moves", "move")
         );
     }
     text

@@ -51,6 +51,7 @@ mod slice;
 mod validate;
 mod watch;
 mod watch_page;
+mod within;
 
 use std::io::Write as _;
 use std::process::ExitCode;
@@ -90,7 +91,14 @@ pub fn main() -> ExitCode {
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
-    let outcome = outputs::Owed::by(&cli.command).around(|outputs| dispatch(&cli, outputs));
+    let owed = outputs::Owed::by(&cli.command);
+    let outcome = match within::refuse(&cli) {
+        Ok(()) => owed.around(|outputs| dispatch(&cli, outputs)),
+        Err(problem) => {
+            owed.settle(&problem);
+            Err(problem)
+        }
+    };
     let exit = outcome.unwrap_or_else(|problem| {
         let color = console::colors_enabled_stderr();
         match cli.command.format() {

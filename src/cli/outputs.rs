@@ -10,6 +10,7 @@ use super::args::{self, Command, InconclusiveArg, RenderedTo, Rendering};
 use super::exit::Exit;
 use super::pipeline;
 use super::problem::Problem;
+use super::within::Bundles;
 use tck_journal::tool;
 use tck_report::junit::{self, Flavour};
 use tck_report::keys::Keys;
@@ -34,7 +35,8 @@ pub(super) struct Owed {
 impl Owed {
     /// By a command.
     pub(super) fn by(command: &Command) -> Self {
-        let files = |all: &[RenderedTo]| all.iter().filter(|one| one.file.is_some()).cloned().collect();
+        let bundles = Bundles::of(command);
+        let files = |all: &[RenderedTo]| all.iter().filter(|one| is_owed(one, &bundles)).cloned().collect();
         match command {
             // A plan tests nothing.
             Command::Run(run) if run.selection.plan => Self::default(),
@@ -80,6 +82,7 @@ impl Owed {
             files: values("--as")
                 .iter()
                 .filter_map(|text| args::to_file(text).ok())
+                .filter(|wanted| is_owed(wanted, &Bundles::default()))
                 .collect(),
             reports: tests.then(folder),
             profile: profile.filter(|_| tests).map(PathBuf::from),
@@ -156,6 +159,12 @@ impl Owed {
         }
         Ok(())
     }
+}
+
+/// Whether something is written at all: to a file, and to none in a bundle, which is refused.
+fn is_owed(wanted: &RenderedTo, bundles: &Bundles) -> bool {
+    let file = wanted.file.as_deref();
+    file.is_some_and(|file| bundles.around(file).is_none())
 }
 
 /// The files of a run that goes on.

@@ -50,7 +50,8 @@ fn cases(result: &QualificationResult) -> Vec<Plain> {
         let case = |name: &str, verdict: Verdict, text: String| Plain {
             suite: suite.clone(),
             name: name.to_owned(),
-            verdict: Some(verdict),
+            verdict,
+            elsewhere: None,
             text,
         };
         all.extend(side.kills.iter().map(|kill| {
@@ -67,7 +68,8 @@ fn cases(result: &QualificationResult) -> Vec<Plain> {
     all.extend(troubles.map(|trouble| Plain {
         suite: "qualification".to_owned(),
         name: "every part is there".to_owned(),
-        verdict: Some(Verdict::Inconclusive),
+        verdict: Verdict::Inconclusive,
+        elsewhere: None,
         text: trouble.to_string(),
     }));
     all

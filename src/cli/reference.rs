@@ -59,7 +59,7 @@ impl<'a> Asked<'a> {
     }
 }
 
-/// Whether the built-in device is tested; if so, it is said.
+/// Whether the built-in device is tested; if so, it is said to `tell`.
 ///
 /// # Errors
 /// When it has to be asked for, or what was asked for is for it and another device is tested.
@@ -67,6 +67,7 @@ pub(super) fn is_tested(
     asked: &Asked<'_>,
     effective: &Effective,
     surroundings: &Surroundings,
+    tell: &dyn Fn(&str),
 ) -> Result<bool, Problem> {
     let device = &effective.profile.device;
     let is_foreign = asked.device.profile.is_some() || device.manufacturer.is_some() || device.serial_number.is_some();
@@ -90,7 +91,7 @@ pub(super) fn is_tested(
         Role::Agv => "AGV",
         Role::MasterControl => "master control",
     };
-    super::tell(&format!(
+    tell(&format!(
         "testing the built-in reference {device}, and no device of yours (--profile names one)"
     ));
     Ok(true)

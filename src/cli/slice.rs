@@ -13,6 +13,7 @@ use tck_base::diagnostic::Diagnostic;
 use tck_capture::merge::Merged;
 use tck_capture::{Message, Told};
 use tck_judge::Library;
+use tck_report::statement::{many, verb};
 
 /// How many messages of the vehicle before a finding are searched for its cause.
 const BEFORE: usize = 20_000;
@@ -51,9 +52,10 @@ pub fn slice(
         return Err(Diagnostic::whole("slice", title).hint(hint).into());
     };
     eprintln!(
-        "{} messages of {} show {} ({})",
-        found.len(),
+        "{} of {} {} {} ({})",
+        many(found.len(), "message"),
         target.vehicle(),
+        verb(found.len(), "shows", "show"),
         target.requirement,
         target.monitor
     );

@@ -20,7 +20,7 @@ use tck_journal::place;
 use tck_judge::Library;
 use tck_pack::{Catalogue, Role};
 use tck_profile as profile;
-use tck_report::statement::many;
+use tck_report::statement::{many, verb};
 use tck_report::{clean, json as result_file};
 
 /// A file that is read as a whole may have so many bytes.
@@ -107,8 +107,10 @@ pub fn validate(arguments: &Validate) -> Result<Exit, Problem> {
 fn summary(name: &str, counted: Counted, format: Format) -> Result<(), Problem> {
     let text = match format {
         Format::Text => format!(
-            "{name}: {} messages, {} with violations, {} with warnings\n",
-            counted.messages, counted.wrong, counted.warned
+            "{name}: {}, {} with violations, {} with warnings\n",
+            many(counted.messages, "message"),
+            counted.wrong,
+            counted.warned
         ),
         Format::Json => format!(
             "{}\n",
@@ -183,7 +185,7 @@ fn check(name: &str, bytes: &[u8], path: &Path, judging: &Judging<'_>) -> Result
         let format = member("format").map(|range| String::from_utf8_lossy(&json[range]));
         if format.is_some_and(|format| format.contains(".result/")) {
             return Ok(match result_file::from_str(&String::from_utf8_lossy(json), name) {
-                Ok(result) => Found::Good(format!("a result of {} tests", result.tests.len())),
+                Ok(result) => Found::Good(format!("a result of {}", many(result.tests.len(), "test"))),
                 Err(error) => Found::Bad(vec![Diagnostic::whole("result", error.to_string())]),
             });
         }
@@ -238,9 +240,8 @@ fn beside_tests(name: &str, text: &str, path: &Path, library: &Library) -> Optio
         .find(|role| folder.ends_with(Path::new("explore").join(role.word())));
     let read = match role {
         _ if has("explore:") => Grammar::read(name, text).map(|_| "a grammar of conversations".to_owned()),
-        Some(role) => {
-            Grammar::check_part(&library.assets, role, name, text).map(|count| format!("a file of {count} stimuli"))
-        }
+        Some(role) => Grammar::check_part(&library.assets, role, name, text)
+            .map(|count| format!("a file of {count} {}", verb(count, "stimulus", "stimuli"))),
         None => return None,
     };
     Some(read.map_err(|error| vec![Diagnostic::whole("explore", error.to_string())]))
@@ -263,16 +264,30 @@ fn one(name: &str, bytes: &[u8], judging: &Judging<'_>) -> Result<Found, Problem
     })
 }
 
+/// How many of some things are used: `4 nodes`, or `3 of 4 nodes`.
+fn part_of(used: usize, all: usize, one: &str) -> String {
+    if used < all {
+        format!("{used} of {}", many(all, one))
+    } else {
+        many(used, one)
+    }
+}
+
 /// Reads a layout for each of its vehicle types: which one is meant is said by the profile that uses it. Gives what it is, and
 /// what looks wrong in it.
 fn layout(source: &Arc<Source>) -> Result<(String, Vec<String>), Vec<Diagnostic>> {
     let (mut said, mut left_out, mut doubts) = (Vec::new(), Vec::new(), Vec::new());
+    let (all_nodes, all_edges) = Layout::written_in(source)?;
     for vehicle_type in Layout::vehicle_types(source)? {
         let whole = Layout::from_lif(source, Some(&vehicle_type))?;
         let layout = whole.fitted(&Unheard);
         let shown = escaped(&vehicle_type);
         let (nodes, edges) = (layout.nodes().count(), layout.edges().count());
-        said.push(format!("{nodes} nodes and {edges} edges for {vehicle_type}"));
+        said.push(format!(
+            "{} and {} for {vehicle_type}",
+            part_of(nodes, all_nodes, "node"),
+            part_of(edges, all_edges, "edge")
+        ));
         let unused = layout.left_out().iter();
         left_out.extend(unused.map(|sentence| format!("\n  not used for {vehicle_type}: {}", escaped(sentence))));
         let unread = whole.unsaid().iter();

@@ -172,7 +172,7 @@ fn a_campaign_that_is_killed_with_its_run_goes_on_where_it_was() {
     bench
         .run(&["campaign", "c.toml"])
         .code(0)
-        .says("1 of 3 runs were carried out before")
+        .says("1 of 3 runs was carried out before")
         .says("reference/second: goes on");
     let expected = [("first", 1), ("second", 2), ("third", 1)];
     let expected = expected.map(|(name, runs)| (format!("reference/{name}"), json!(0), json!(runs)));
@@ -271,6 +271,15 @@ fn what_is_wrong_with_a_campaign_has_a_place_and_is_2() {
     call(
         "[campaign]\nparallel = 2\n[devices.a]\n[devices.b]\n[suites.c]\n",
         &["c.toml:3", "no address of its own"],
+    );
+    call(
+        &format!("{good}tests = [\"{QUICK}\"]\n[suites.c]\ntests = [\"no/such\"]\n"),
+        &["c.toml:5", "a/c: no test matches `no/such`", "list tests"],
+    );
+    fs::write(bench.path().join("wrong.toml"), "[device]\nmanufacturer = 7\n").unwrap();
+    call(
+        "[devices.a]\nprofile = \"wrong.toml\"\n[suites.b]\n[suites.c]\n",
+        &["wrong.toml:2", "manufacturer"],
     );
     bench.run(&["campaign", "nowhere.toml"]).code(2).says("nowhere.toml");
     // An entry does not become another one between two calls.

@@ -126,6 +126,8 @@ fn what_is_explained_is_there_for_programs() {
     );
     assert!(!requirement["tests"].as_array().unwrap().is_empty());
     assert!(!requirement["provedWith"].as_array().unwrap().is_empty());
+    let resting = &json(&["explain", "ORD-FLOW-06", "--format", "json"])[0];
+    assert_eq!(resting["restsOn"], serde_json::json!(["ORD-04"]));
     let test = &json(&["explain", "order-rejection/lower-update-id", "--format", "json"])[0];
     assert_eq!(test["kind"], "test");
     assert!(

@@ -131,7 +131,26 @@ fn of_a_run_that_certifies_nothing_the_package_says_why_and_none_lies_in_its_bun
         .run(&["report", "--package", &inside, &folder])
         .code(2)
         .says("lie in the bundle");
+    for kind in ["junit", "allure"] {
+        let inside = format!("{kind}={folder}/more");
+        bench
+            .run(&["report", &folder, "--as", "markdown=out.md", "--as", &inside])
+            .code(2)
+            .says("lie in the bundle")
+            .says("name a place outside");
+        let outside = fs::read_to_string(bench.path().join("out.md")).unwrap();
+        assert!(outside.contains("lie in the bundle"), "{outside}");
+    }
+    bench
+        .run(&["run", "--virtual", "order-rejection/unreadable", "--out", &folder])
+        .code(2)
+        .says("lie in the bundle");
     bench.run(&["report", "--verify", &folder]).code(0);
+    fs::create_dir(bench.path().join("folder.zip")).unwrap();
+    bench
+        .run(&["report", "--package", "folder.zip", &folder])
+        .code(2)
+        .says("no regular file");
     let result = bench.bundle().join("result.json");
     let text = fs::read_to_string(&result).unwrap();
     fs::write(&result, text.replacen("reference-agv", "another", 1)).unwrap();

@@ -28,7 +28,7 @@ fn every_kind_of_good_file_is_told_by_its_content() {
         (fixture("profiles/good/minimal.toml"), "valid profile: ACME 0001"),
         (fixture("layouts/hall.lif.json"), "a layout with"),
         (suite, "test"),
-        (result, "a result of 1 tests"),
+        (result, "a result of 1 test"),
     ] {
         let ended = run(&["validate", &file]).code(0).prints(what);
         // What deserves a warning stands before it, what is left out of a layout below it.

@@ -206,6 +206,13 @@ fn what_is_missing_or_of_something_else_is_named_and_is_never_a_pass() {
     part("2/2", "foreign", "7", &[QUICK, "order-acceptance"]);
     let merge = |parts: &[&str], out: &str| bench.run(&[&["report", "--merge"], parts, &["--out", out]].concat());
     merge(&["one", "two"], "whole").code(0);
+    // Of two that do not belong together, both are named.
+    merge(&["one", "foreign"], "pair").code(3);
+    let pair = read(&bench.path().join("pair/result.json"));
+    let limits = pair["limits"].as_array().unwrap().iter().filter_map(Value::as_str);
+    let mut limits = limits;
+    let foreign = limits.find(|text| text.contains("is no part of this")).unwrap();
+    assert!(foreign.contains("/one/") && foreign.contains("/foreign/"), "{foreign}");
     for (parts, out, why) in [
         (&["one"][..], "a", "part 2 of 2 is missing"),
         (&["one", "two", "twice"], "b", "part 2 of 2 is there 2 times"),

@@ -237,7 +237,7 @@ fn own_suites_are_checked_with_their_own_requirements_actions_and_stimuli() {
     ];
     let [requirements, blinks, keeps, explore] = files.each_ref().map(String::as_str);
     let checked = run(&["validate", "--suites", &own, requirements, blinks, keeps, explore]).code(0);
-    for what in ["a file of 4 requirements", "a test", "a file of 1 stimuli"] {
+    for what in ["a file of 4 requirements", "a test", "a file of 1 stimulus"] {
         assert!(checked.stdout.contains(what), "{}", checked.stdout);
     }
     run(&["validate", keeps]).code(2).prints("unknown requirement `SYS-12`");

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use tokio::io::AsyncReadExt;
 
 use vda5050_tck::journal::event::{Close, Direction, LinkFault, Occurrence, Packet};
+use vda5050_tck::link::Link;
 
 use crate::rig::*;
 

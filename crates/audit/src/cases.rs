@@ -4,7 +4,9 @@ use super::join::restricted;
 use super::mistakes::Mistake;
 use super::result::{AuditResult, FindingResult, SideResult, VehicleResult};
 use tck_base::verdict::Verdict;
+use tck_report::cases::Elsewhere;
 use tck_report::junit::Plain;
+use tck_report::statement::times;
 
 /// A side of a vehicle, for people.
 pub(super) fn named(vehicle: &VehicleResult, side: &SideResult) -> String {
@@ -31,7 +33,8 @@ pub(super) fn cases(result: &AuditResult) -> Vec<Plain> {
                     suite: suite.clone(),
                     name: decided.id.clone(),
                     // A build server counts mistakes, so what follows from one is shown beside it and counts for none.
-                    verdict: cause.is_none().then_some(decided.verdict),
+                    verdict: decided.verdict,
+                    elsewhere: cause.map(|_| Elsewhere::Cause),
                     text: match cause {
                         Some(cause) => format!("follows from {cause}: {}", texts.join("\n")),
                         None => texts.join("\n"),
@@ -44,7 +47,8 @@ pub(super) fn cases(result: &AuditResult) -> Vec<Plain> {
         all.push(Plain {
             suite: "audit".to_owned(),
             name: "something was judged".to_owned(),
-            verdict: Some(Verdict::Error),
+            verdict: Verdict::Error,
+            elsewhere: None,
             text: "nothing was judged".to_owned(),
         });
     }
@@ -52,7 +56,8 @@ pub(super) fn cases(result: &AuditResult) -> Vec<Plain> {
         all.push(Plain {
             suite: "audit".to_owned(),
             name: name.to_owned(),
-            verdict: Some(verdict),
+            verdict,
+            elsewhere: None,
             text,
         });
     }
@@ -77,8 +82,11 @@ fn cause_of<'m>(id: &str, mistakes: &[Mistake<'m>]) -> Option<&'m str> {
 fn sentence(finding: &FindingResult, result: &AuditResult) -> String {
     let place = place(finding, result);
     format!(
-        "{} times at {place}, first {}, last {}: {}",
-        finding.count, finding.first, finding.last, finding.text
+        "{} at {place}, first {}, last {}: {}",
+        times(finding.count),
+        finding.first,
+        finding.last,
+        finding.text
     )
 }
 

@@ -28,6 +28,8 @@ struct Followed {
     order: String,
     messages: RangeInclusive<u64>,
     driven: Driven,
+    /// Whether a state has named it: one that was refused is never named.
+    named: bool,
 }
 
 impl Courses {
@@ -44,14 +46,19 @@ impl Courses {
             && before.order == id
             && self.now.as_ref().is_none_or(|now| now.order != id)
         {
-            before.driven.note(number, message);
-            return;
+            // Of two orders of which only one was ever named, the vehicle has the other one in hand, or goes on with it.
+            if before.named && self.now.as_ref().is_none_or(|now| now.named) {
+                before.driven.note(number, message);
+                return;
+            }
+            std::mem::swap(&mut self.now, &mut self.before);
         }
         if let Some(id) = order.filter(|id| self.now.as_ref().is_none_or(|now| now.order != **id)) {
             let begun = Followed {
                 order: id.to_owned(),
                 messages: number..=number,
                 driven: Driven::new(Bounds::FLEET),
+                named: false,
             };
             let before = self.now.replace(begun);
             let older = std::mem::replace(&mut self.before, before);
@@ -62,6 +69,7 @@ impl Courses {
         }
         if let Some(now) = &mut self.now {
             now.messages = *now.messages.start()..=number;
+            now.named |= matches!(message, MessageView::State(_)) && order == Some(now.order.as_str());
             now.driven.note(number, message);
         }
     }
@@ -154,6 +162,30 @@ mod tests {
     fn a_vehicle_of_many_orders_keeps_a_few() {
         let found: Vec<u64> = (0..10_000).collect();
         assert_eq!(pictures(1_000, &found).len(), ORDERS);
+    }
+
+    #[test]
+    fn an_order_that_is_refused_ends_no_picture() {
+        let mut courses = Courses::default();
+        let found = |span: &RangeInclusive<u64>| span.contains(&8);
+        let order = |id: &str| {
+            let order = json!({ "orderId": id, "orderUpdateId": 0, "nodes": [], "edges": [] });
+            MessageView::of_value(Topic::Order, &order, &Names::default())
+        };
+        courses.note(1, &order("a"), found);
+        courses.note(2, &state("a", 0), found);
+        for (number, refused) in [(3, "b"), (5, "c"), (7, "d")] {
+            courses.note(number, &order(refused), found);
+            courses.note(number + 1, &state("a", u32::try_from(number).expect("small")), found);
+        }
+        courses.note(9, &state("a", 9), found);
+        let drawn = courses.finish(&[side(&[8])]);
+        assert_eq!(drawn.len(), 1);
+        assert_eq!(
+            (drawn[0].order.as_str(), drawn[0].found[0].place),
+            ("a", Some((7.0, 0.0)))
+        );
+        assert_eq!(drawn[0].trail.first(), Some(&(0.0, 0.0)));
     }
 
     #[test]

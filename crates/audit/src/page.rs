@@ -225,9 +225,13 @@ fn not_compared(side: &SideResult, result: &AuditResult) -> String {
         return String::new();
     }
     let mut text = format!(
-        "      {} of {} were not compared with those before them\n",
+        "      {} of {} {}\n",
         side.not_compared,
-        counted(side.compared + side.not_compared, "message")
+        counted(side.compared + side.not_compared, "message"),
+        match side.not_compared {
+            1 => "was not compared with what was before it",
+            _ => "were not compared with those before them",
+        }
     );
     let mut largest: Vec<&Stretch> = side.stretches.iter().collect();
     largest.sort_by_key(|stretch| std::cmp::Reverse(stretch.messages));

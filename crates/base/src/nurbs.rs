@@ -128,6 +128,7 @@ fn read_points(points: Option<Vec<WrittenPoint>>, flaws: &mut Vec<Flaw>) -> Vec<
     let mut points = Vec::with_capacity(list.len());
     for (at, point) in list.into_iter().enumerate() {
         let weight = near(point.weight.or(Some(1.0))).filter(|weight| *weight >= 0.0);
+        let is_far = point.x.is_some() && point.y.is_some();
         match (near(point.x), near(point.y), weight) {
             (Some(x), Some(y), Some(weight)) => points.push(ControlPoint { x, y, weight }),
             (Some(_), Some(_), None) => {
@@ -135,6 +136,9 @@ fn read_points(points: Option<Vec<WrittenPoint>>, flaws: &mut Vec<Flaw>) -> Vec<
                     "controlPoints[{at}].weight is no number of at least 0"
                 )));
             }
+            _ if is_far => flaws.push(Flaw::Member(format!(
+                "controlPoints[{at}] lies further away than any place"
+            ))),
             _ => flaws.push(Flaw::Member(format!("controlPoints[{at}] has no x and y"))),
         }
     }
@@ -412,6 +416,10 @@ mod tests {
             (json!({ "degree": 0 }), "degree is not"),
             (json!({ "degree": 1.5 }), "degree is not"),
             (json!({ "controlPoints": [{ "x": 0 }] }), "has no x and y"),
+            (
+                json!({ "controlPoints": [{ "x": 1e300, "y": 0 }] }),
+                "lies further away than any place",
+            ),
             (json!({ "controlPoints": null }), "controlPoints is not"),
             (json!({ "knotVector": [0, "1"] }), "knotVector is not"),
             (

@@ -6,12 +6,13 @@
 //! campaign that has started it.
 
 use std::fs::File;
-use std::io;
+use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
 use tck_journal::file;
+use tck_report::clean::{line, short};
 use tck_report::json::write_atomically;
 use tck_report::manifest::{Manifest, digest};
 
@@ -27,6 +28,10 @@ const JUDGED: [u8; 3] = [0, 1, 3];
 const INTERRUPTED: u8 = 130;
 /// What broke.
 const BROKEN: u8 = 5;
+/// What a line begins with behind which the output of the next run stands.
+const RUN: &str = "campaign: run ";
+/// How much of the end of an output is looked at.
+const END: u64 = 64 * 1024;
 
 /// The folder of one entry.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -111,6 +116,41 @@ impl Place {
     #[must_use]
     pub fn output(&self) -> PathBuf {
         self.folder().join("output.txt")
+    }
+
+    /// The file that the run of that number, counted from 1, prints to, behind what those before it have printed.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn begin_output(&self, attempt: u64) -> Result<File, PlaceError> {
+        let path = self.output();
+        let failed = |error| PlaceError::Io(path.clone(), error);
+        let mut file = File::options().append(true).create(true).open(&path).map_err(failed)?;
+        writeln!(file, "{RUN}{attempt}").map_err(failed)?;
+        Ok(file)
+    }
+
+    /// The error that the last run has printed last, in one line with its place.
+    fn complaint(&self) -> Option<String> {
+        let mut file = File::open(self.output()).ok()?;
+        let length = file.metadata().ok()?.len();
+        file.seek(SeekFrom::Start(length.saturating_sub(END))).ok()?;
+        let mut bytes = Vec::new();
+        file.take(END).read_to_end(&mut bytes).ok()?;
+        let text = String::from_utf8_lossy(&bytes);
+        let lines: Vec<&str> = text.lines().collect();
+        let begun = lines.iter().rposition(|line| line.starts_with(RUN));
+        let lines = &lines[begun.unwrap_or(0)..];
+        let (at, said) = lines
+            .iter()
+            .enumerate()
+            .rev()
+            .find_map(|(at, line)| Some((at, error_of(line)?)))?;
+        let place = lines
+            .get(at + 1)
+            .and_then(|next| next.trim_start().strip_prefix("--> "));
+        let place = place.map_or_else(String::new, |place| format!(" ({})", short(&line(place), 200)));
+        Some(format!("{}{place}", short(&line(said), 300)))
     }
 
     /// The stream of events of the run of that number, counted from 1.
@@ -223,6 +263,13 @@ impl Place {
             settled.exit = BROKEN;
             settled.said = why;
         }
+        if !JUDGED.contains(&settled.exit)
+            && let Some(why) = self.complaint()
+            && !settled.said.contains(&why)
+        {
+            let before = if settled.said.is_empty() { "" } else { "; " };
+            settled.said.push_str(&format!("{before}{why}"));
+        }
         settled
     }
 
@@ -291,6 +338,15 @@ impl Place {
         let failed = |error| PlaceError::Io(path.clone(), error);
         std::fs::create_dir_all(self.folder()).map_err(failed)?;
         write_atomically(&path, format!("{value:#}\n").as_bytes()).map_err(failed)
+    }
+}
+
+/// What a line says, if it is the first one of an error.
+fn error_of(text: &str) -> Option<&str> {
+    let rest = text.strip_prefix("error")?;
+    match rest.strip_prefix('[') {
+        Some(rest) => Some(rest.split_once("]: ")?.1),
+        None => rest.strip_prefix(": "),
     }
 }
 
@@ -423,6 +479,28 @@ mod tests {
         assert_eq!(settled.exit, BROKEN, "evidence that has changed is none");
         place.again().expect("again");
         assert_eq!((place.stand(), place.attempts()), (Stand::New, 0));
+    }
+
+    #[test]
+    fn a_run_that_ended_with_an_error_says_why_and_not_why_the_one_before_it_did() {
+        let root = tempfile::tempdir().expect("folder");
+        let place = Place::of(root.path(), &entry("t"));
+        place.begin(&entry("t")).expect("begun");
+        std::fs::write(place.events(1), "").expect("events");
+        let said = |code: u8| place.ended(Some(code), false).map(|settled| settled.said);
+        let print = |attempt: u64, text: &str| {
+            let mut output = place.begin_output(attempt).expect("output");
+            output.write_all(text.as_bytes()).expect("output");
+        };
+        print(1, "testing\nerror[key]: no such key\n --> device.toml:3:1\n  |\n");
+        assert_eq!(said(2).as_deref(), Some("no such key (device.toml:3:1)"));
+        print(2, "error: the port is taken\n");
+        assert_eq!(said(5).as_deref(), Some("the port is taken"));
+        print(3, "erroneous\nerror: \u{1b}[31mred\n");
+        assert_eq!(said(5).map(|said| said.contains('\u{1b}')), Some(false));
+        print(4, "nothing that is an error\n");
+        assert_eq!(said(5).as_deref(), Some(""));
+        assert!(said(0).expect("settled").starts_with("the run ended with exit code 0"));
     }
 
     #[test]

@@ -145,12 +145,13 @@ impl Summary {
         let cases = self.entries.iter().map(|one| Plain {
             suite: one.device.clone(),
             name: one.suite.clone(),
-            verdict: Some(match one.exit {
+            verdict: match one.exit {
                 Some(0) => Verdict::Pass,
                 Some(1) => Verdict::Fail,
                 Some(3) => Verdict::Inconclusive,
                 _ => Verdict::Error,
-            }),
+            },
+            elsewhere: None,
             text: match one.said.as_str() {
                 "" => one.meaning.clone(),
                 said => format!("{}: {}", one.meaning, short(said, 600)),

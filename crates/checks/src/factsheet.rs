@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use crate::finding::{broken, quote, remark, show};
+use crate::finding::{broken, number, quote, remark, show};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_view::{
     Envelope2d, FactsheetView, Field, LoadSet, Member, Number, PhysicalParameters, Point as Corner, ProtocolLimits,
@@ -86,7 +86,13 @@ impl Running for Consistency {
                 && low > high
             {
                 let name = |field| record.names().name(field).unwrap_or_default();
-                let text = format!("{} {low} is above {} {high}", name(least), name(most));
+                let text = format!(
+                    "{} {} is above {} {}",
+                    name(least),
+                    number(low),
+                    name(most),
+                    number(high)
+                );
                 findings.push(remark("FACT-04", seq, text));
             }
         }

@@ -7,6 +7,15 @@ use tck_check::CheckFinding;
 use tck_pack::RequirementId;
 use tck_view::{Member, Shown};
 
+/// A number of a device: one that would take many digits in powers of ten.
+pub(crate) fn number(value: f64) -> String {
+    if value == 0.0 || (1e-6..1e15).contains(&value.abs()) {
+        format!("{value}")
+    } else {
+        format!("{value:e}")
+    }
+}
+
 /// A finding on `requirement` that follows its mood.
 pub(crate) fn broken(requirement: &str, seq: u64, message: impl Into<String>) -> CheckFinding {
     CheckFinding {
@@ -59,4 +68,16 @@ fn shorten(text: &str) -> String {
         short.push('…');
     }
     short
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_is_short_whatever_it_is() {
+        let shown = [0.0, 4.0, -3.25, 1e300, 1e-300, f64::MIN_POSITIVE].map(number);
+        assert_eq!(shown[..5], ["0", "4", "-3.25", "1e300", "1e-300"]);
+        assert!(shown[5].len() < 30, "{}", shown[5]);
+    }
 }

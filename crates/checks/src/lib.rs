@@ -37,6 +37,8 @@ mod instant_requests;
 mod known_members;
 mod linked_state;
 mod message;
+mod message_encoding;
+mod message_spelling;
 mod motion;
 mod motion_signs;
 mod mqtt;
@@ -57,7 +59,7 @@ use tck_check::Check;
 /// Every named check, in the order they are listed and run.
 pub static REGISTRY: &[Check] = &[
     message::SCHEMA,
-    message::ENCODING,
+    message_encoding::ENCODING,
     fleet::COMMANDED,
     fleet_orders::OWN_ORDERS,
     fleet_heard::EACH_HEARD,

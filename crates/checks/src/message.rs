@@ -1,21 +1,17 @@
-//! `message/schema`, `message/encoding`: every message by itself.
+//! `message/schema`: every message by itself, as the schema of its topic has it.
 //!
 //! Relations between fields and between messages are left to the other checks; so are the fraction digits of
 //! a timestamp and the value of a version, which `header` judges by their own rulings.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use serde_json::Value;
 
-use crate::finding::{broken, quote, remark};
+use super::message_spelling::{Spelling, plain, standing_instead};
+use crate::finding::{broken, number, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_journal::json::JsonProblem;
-use tck_pack::{Finding, FindingKind, MessageSchema, Pack};
-use tck_view::{
-    ActionView, BatteryState, Edge, FactsheetView, Field, Header, InstantActionsView, Member, MessageView, Names, Node,
-    OrderView, PhysicalParameters, StateView, Topic, VisualizationView,
-};
+use tck_pack::{Finding, FindingKind, Pack};
+use tck_view::{BatteryState, FactsheetView, Field, Header, Member, MessageView, Names, PhysicalParameters, StateView};
 use tck_world::{Fact, Listen, Observation};
 
 /// `message/schema`.
@@ -100,49 +96,12 @@ pub(super) const SCHEMA: Check = Check {
     start: |context| Box::new(Schema::new(context)),
 };
 
-/// `message/encoding`.
-pub(super) const ENCODING: Check = Check {
-    name: "message/encoding",
-    decides: &["MQTT-02", "JSON-03", "JSON-08", "JSON-10"],
-    doc: "Every payload is one JSON object in UTF-8 without NaN, Infinity or numbers beyond all limits. A byte order \
-          mark and a member that occurs twice are warnings. Clearing a retained topic with nothing is no finding.",
-    arguments: &[],
-    listens: &[Listen::AnyDelivered, Listen::AnyPublished],
-    reads: &[],
-    needs: &[],
-    start: |_| Box::new(Encoding),
-};
-
 struct Schema {
-    /// The member names of each topic's messages.
-    members: BTreeMap<String, Vec<String>>,
-    /// The member names of what is inside of messages, by topic and path.
-    inner: Vec<Inner>,
+    spelling: Spelling,
     /// What the version calls the members of [`OF_ORDER`].
     of_order: Vec<String>,
     /// An angle beyond pi by what single precision does to it was remarked on.
     rounded: bool,
-}
-
-/// Objects inside of the messages of a topic, and the members they have.
-struct Inner {
-    topic: Topic,
-    /// The names on the way to them.
-    path: Vec<String>,
-    members: Vec<String>,
-}
-
-impl Inner {
-    /// `None` where the version has no such objects.
-    fn of(topic: Topic, path: &[Field], pack: &Pack) -> Option<Self> {
-        let names: Option<Vec<&str>> = path.iter().map(|field| pack.names().name(*field)).collect();
-        let names: Vec<&str> = names?.into_iter().flat_map(|name| name.split('/')).collect();
-        Some(Self {
-            topic,
-            members: pack.schema(topic.as_str())?.members(&names),
-            path: names.into_iter().map(str::to_owned).collect(),
-        })
-    }
 }
 
 /// Members of a state that repeat what an order said.
@@ -177,168 +136,13 @@ fn is_rounded_pi(finding: &Finding, value: &Value) -> bool {
 
 impl Schema {
     fn new(context: &CheckContext<'_>) -> Self {
-        let names = context.topics.keys();
-        let members = names.filter_map(|name| Some((name.clone(), context.pack.schema(name)?.members(&[]))));
-        let inner = INNER
-            .iter()
-            .filter_map(|(topic, path)| Inner::of(*topic, path, context.pack));
         let of_order = OF_ORDER.iter().filter_map(|field| context.pack.names().name(*field));
         Self {
-            members: members.collect(),
-            inner: inner.collect(),
+            spelling: Spelling::new(context),
             of_order: of_order.map(str::to_owned).collect(),
             rounded: false,
         }
     }
-
-    /// Optional members that are known ones but for their spelling; those that are missing by it were named with that.
-    fn misspelled(&self, topic: &str, value: &Value, seq: u64, findings: &mut Vec<CheckFinding>) {
-        let whole = Inside {
-            value,
-            places: [None; DEEPEST],
-        };
-        if let Some(known) = self.members.get(topic) {
-            odd_members(topic, &[], vec![whole], known, seq, findings);
-        }
-        for Inner { path, members, .. } in self.inner.iter().filter(|inner| inner.topic.as_str() == topic) {
-            let mut inside = vec![whole];
-            for (level, name) in path.iter().enumerate() {
-                let all = inside.iter().flat_map(|one| one.inner(level, name));
-                inside = all.take(INSIDE).collect();
-            }
-            odd_members(topic, path, inside, members, seq, findings);
-        }
-    }
-}
-
-/// What is inside of messages and has members of its own.
-const INNER: [(Topic, &[Field]); 16] = [
-    (Topic::State, &[StateView::safety_state]),
-    (Topic::State, &[StateView::battery_state]),
-    (Topic::State, &[StateView::position]),
-    (Topic::State, &[StateView::velocity]),
-    (Topic::State, &[StateView::errors]),
-    (Topic::Visualization, &[VisualizationView::position]),
-    (Topic::Visualization, &[VisualizationView::velocity]),
-    (Topic::Order, &[OrderView::nodes]),
-    (Topic::Order, &[OrderView::nodes, Node::node_position]),
-    (Topic::Order, &[OrderView::nodes, Node::actions]),
-    (
-        Topic::Order,
-        &[OrderView::nodes, Node::actions, ActionView::action_parameters],
-    ),
-    (Topic::Order, &[OrderView::edges]),
-    (Topic::Order, &[OrderView::edges, Edge::actions]),
-    (Topic::Order, &[OrderView::edges, Edge::corridor]),
-    (Topic::Order, &[OrderView::edges, Edge::trajectory]),
-    (Topic::InstantActions, &[InstantActionsView::actions]),
-];
-/// How many of them are looked at.
-const INSIDE: usize = 512;
-
-/// How many names lead to the deepest of them, at most.
-const DEEPEST: usize = 6;
-
-/// What is inside of a message, and its place in each list on the way to it.
-#[derive(Clone, Copy)]
-struct Inside<'v> {
-    value: &'v Value,
-    places: [Option<usize>; DEEPEST],
-}
-
-impl<'v> Inside<'v> {
-    /// What goes by a name inside of this: the elements of a list, or the one that stands there.
-    fn inner(&self, level: usize, name: &str) -> impl Iterator<Item = Self> + use<'v> {
-        let mut places = self.places;
-        let found = self.value.get(name);
-        let (list, one) = match found {
-            Some(Value::Array(list)) => (list.as_slice(), None),
-            one => (&[][..], one),
-        };
-        let elements = list.iter().take(INSIDE).enumerate();
-        let elements = elements.map(move |(at, value)| {
-            if let Some(place) = places.get_mut(level) {
-                *place = Some(at);
-            }
-            Self { value, places }
-        });
-        elements.chain(one.map(|value| Self { value, places }))
-    }
-
-    /// Where it stands.
-    fn place(&self, topic: &str, path: &[String]) -> String {
-        let mut place = topic.to_owned();
-        for (name, at) in path.iter().zip(self.places) {
-            let _ = write!(place, "/{name}");
-            if let Some(at) = at {
-                let _ = write!(place, "/{at}");
-            }
-        }
-        place
-    }
-}
-
-/// Members of these objects that are known ones but for their spelling. Where the right one stands beside it, it is one of the
-/// vendor's own.
-fn odd_members(
-    topic: &str,
-    path: &[String],
-    objects: Vec<Inside<'_>>,
-    known: &[String],
-    seq: u64,
-    findings: &mut Vec<CheckFinding>,
-) {
-    // The same mistake is made everywhere; once is enough.
-    let mut said = BTreeSet::new();
-    for inside in objects {
-        let value = inside.value;
-        let odd = value.as_object().into_iter().flatten().map(|(name, _)| name);
-        for name in odd.filter(|name| name.len() < 64 && !known.contains(name)).take(16) {
-            let meant = known.iter().find(|known| plain(known) == plain(name));
-            let Some(meant) = meant.filter(|meant| value.get(meant.as_str()).is_none()) else {
-                continue;
-            };
-            let place = inside.place(topic, path);
-            let is_said = |finding: &CheckFinding| {
-                finding.seq == seq && finding.message.starts_with(&format!("{place}/{meant}: "))
-            };
-            if !findings.iter().any(is_said) && said.insert(name.clone()) {
-                let text = format!("{place}/{name}: this member is spelled {meant:?}");
-                findings.push(broken("JSON-01", seq, text));
-            }
-        }
-    }
-}
-
-/// The member that stands there instead of one that is missing: the same but for its spelling, or nearly the same.
-fn standing_instead<'v>(finding: &Finding, schema: &MessageSchema, value: &'v Value) -> Option<&'v str> {
-    let (holder, name) = finding.path.rsplit_once('/')?;
-    let members = value.pointer(holder)?.as_object()?;
-    let path: Vec<&str> = holder
-        .split('/')
-        .skip(1)
-        .filter(|part| part.parse::<u32>().is_err())
-        .collect();
-    let known = schema.members(&path);
-    let odd = || {
-        let names = members.keys().map(String::as_str);
-        names.filter(|other| other.len() < 64 && !known.iter().any(|known| known == other))
-    };
-    odd()
-        .find(|other| plain(other) == plain(name))
-        .or_else(|| odd().find(|other| is_slip(other, name)))
-}
-
-/// Whether one name is the other but for a slip of the hand.
-fn is_slip(one: &str, other: &str) -> bool {
-    strsim::osa_distance(one, other) <= (other.len() / 4).min(2)
-}
-
-fn plain(name: &str) -> String {
-    name.chars()
-        .filter(char::is_ascii_alphanumeric)
-        .map(|character| character.to_ascii_lowercase())
-        .collect()
 }
 
 impl Running for Schema {
@@ -386,7 +190,7 @@ impl Running for Schema {
                 findings.push(broken("JSON-01", seq, text));
             }
         }
-        self.misspelled(topic, value, seq, findings);
+        self.spelling.misspelled(topic, value, seq, findings);
         let view = record.message();
         let charge = view
             .and_then(MessageView::state)
@@ -405,7 +209,10 @@ fn beyond_full(state: &StateView, names: &Names, seq: u64) -> Option<CheckFindin
         names.name(StateView::battery_state)?,
         names.name(BatteryState::battery_charge)?,
     );
-    let text = format!("state/{object}/{member}: {charge} is not between 0 and 100 percent");
+    let text = format!(
+        "state/{object}/{member}: {} is not between 0 and 100 percent",
+        number(charge)
+    );
     let is_one = (-ROUNDED..=100.0 + ROUNDED).contains(&charge);
     (!is_one).then(|| remark("STATE-MSG-15", seq, text))
 }
@@ -463,66 +270,6 @@ fn special(text: &str) -> bool {
     ["nan", "inf", "infinity"]
         .iter()
         .any(|name| text.eq_ignore_ascii_case(name))
-}
-
-struct Encoding;
-
-impl Running for Encoding {
-    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        let Some(message) = record.published() else {
-            return false;
-        };
-        let (Some(parsed), Some(payload)) = (record.parsed(), record.payload()) else {
-            return false;
-        };
-        let (topic, seq) = (message.name, record.seq());
-        let mut judged = true;
-        for problem in parsed.problems().iter().take(8) {
-            let text = format!("{topic}: {}", quote(&problem.to_string()));
-            match problem {
-                // Too big to be kept and too deep to be parsed are limits of ours.
-                JsonProblem::TooBig { .. } | JsonProblem::TooDeep => judged = false,
-                // Nothing, retained, clears a topic; a subscriber does not see which it was.
-                JsonProblem::Empty if message.retain.unwrap_or(matches!(topic, "connection" | "factsheet")) => {
-                    judged = false;
-                }
-                JsonProblem::Empty | JsonProblem::NotAnObject => findings.push(broken("MQTT-02", seq, text)),
-                JsonProblem::NotUtf8 { .. } => {
-                    findings.push(broken("JSON-03", seq, text.clone()));
-                    findings.push(broken("MQTT-02", seq, text));
-                }
-                JsonProblem::ByteOrderMark => findings.push(remark("JSON-03", seq, text)),
-                JsonProblem::DuplicateMember(_) => findings.push(remark("JSON-10", seq, text)),
-                JsonProblem::Syntax(reason) => {
-                    if reason.contains("number out of range") || names_no_number(payload.bytes()) {
-                        findings.push(broken("JSON-08", seq, text.clone()));
-                    }
-                    findings.push(broken("MQTT-02", seq, text));
-                }
-            }
-        }
-        judged
-    }
-}
-
-/// Whether NaN or Infinity stands somewhere outside of a string.
-fn names_no_number(bytes: &[u8]) -> bool {
-    let (mut quoted, mut escaped) = (false, false);
-    for (at, byte) in bytes.iter().enumerate() {
-        match byte {
-            _ if escaped => escaped = false,
-            b'\\' if quoted => escaped = true,
-            b'"' => quoted = !quoted,
-            b'N' | b'I' if !quoted => {
-                let rest = &bytes[at..];
-                if rest.starts_with(b"NaN") || rest.starts_with(b"Infinity") {
-                    return true;
-                }
-            }
-            _ => {}
-        }
-    }
-    false
 }
 
 #[cfg(test)]
@@ -676,37 +423,5 @@ mod tests {
         trace.message("factsheet", &header);
         let found = trace.judge("message/schema").summary();
         assert_eq!(found.iter().filter(|id| *id == "FACT-02").count(), 6);
-    }
-
-    fn encoded(bytes: &[u8]) -> Vec<String> {
-        let mut trace = Trace::subscriber();
-        trace.bytes("state", bytes);
-        trace.judge("message/encoding").summary()
-    }
-
-    #[test]
-    fn one_object_in_utf8_is_right() {
-        assert!(encoded("{\"x\":\"Nürnberg NaN\"}".as_bytes()).is_empty());
-    }
-
-    #[test]
-    fn what_is_no_json_object_in_utf8_is_found() {
-        assert_eq!(encoded(b""), ["MQTT-02"]);
-        assert_eq!(encoded(b"[1]"), ["MQTT-02"]);
-        assert_eq!(encoded(b"{\"a\":1} {}"), ["MQTT-02"]);
-        assert_eq!(encoded(b"{\"a\":\"\xff\"}"), ["JSON-03", "MQTT-02"]);
-        assert_eq!(encoded(b"\xef\xbb\xbf{}"), ["JSON-03 warning"]);
-        assert_eq!(encoded(b"{\"a\":1,\"a\":2}"), ["JSON-10 warning"]);
-        assert_eq!(encoded(b"{\"a\":NaN}"), ["JSON-08", "MQTT-02"]);
-        assert_eq!(encoded(b"{\"a\":-Infinity}"), ["JSON-08", "MQTT-02"]);
-        assert_eq!(encoded(b"{\"a\":1e999}"), ["JSON-08", "MQTT-02"]);
-    }
-
-    #[test]
-    fn clearing_a_retained_topic_is_no_finding() {
-        let mut trace = Trace::subscriber();
-        trace.bytes("connection", b"");
-        let outcome = trace.judge("message/encoding");
-        assert!(outcome.findings.is_empty() && outcome.judged == 0);
     }
 }

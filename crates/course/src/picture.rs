@@ -25,6 +25,7 @@ const STYLE: &str = "\
 .course .base { stroke: var(--accent, #1f5f99); stroke-width: 9; stroke-opacity: .45; stroke-linecap: round; }
 .course .horizon { stroke: var(--accent, #1f5f99); stroke-width: 9; stroke-opacity: .45; stroke-dasharray: 14 10; }
 .course .trail { stroke: var(--ink, #1b1f24); stroke-width: 3.2; stroke-dasharray: .1 6; stroke-linecap: round; }
+.course .after { stroke: var(--ink, #1b1f24); stroke-width: 2.4; stroke-opacity: .4; stroke-dasharray: .1 9; stroke-linecap: round; }
 .course .node { fill: var(--ink, #1b1f24); }
 .course .start { fill: var(--paper, #fff); stroke: var(--ink, #1b1f24); stroke-width: 2.5; }
 .course .vehicle { fill: var(--fail, #b3261e); stroke: var(--paper, #fff); stroke-width: 1.5; }
@@ -43,6 +44,8 @@ pub enum LineKind {
     Horizon,
     /// Where a vehicle was.
     Trail,
+    /// Where it was after what the picture is about.
+    After,
 }
 
 impl LineKind {
@@ -52,6 +55,7 @@ impl LineKind {
             Self::Base => "base",
             Self::Horizon => "horizon",
             Self::Trail => "trail",
+            Self::After => "after",
         }
     }
 }
@@ -198,7 +202,7 @@ impl Picture {
         };
         let before = self.points().count();
         for line in &mut self.lines {
-            if line.kind == LineKind::Trail {
+            if matches!(line.kind, LineKind::Trail | LineKind::After) {
                 line.points.retain(|point| is_drawn(*point));
             } else if !line.points.iter().all(|point| is_drawn(*point)) {
                 line.points.clear();

@@ -6,6 +6,8 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
+use toml_writer::ToTomlKey as _;
+
 use super::hook_action::{Hook, HookAction, NATURAL_TRAFFIC, RESTART_DEVICE, START_DEVICE, STOP_DEVICE};
 use super::value::Value;
 use super::{LayoutList, SampleAction, Setting, VehicleGroup, time};
@@ -45,12 +47,7 @@ fn list(items: impl Iterator<Item = Option<String>>) -> Option<String> {
 
 /// A name as TOML writes it before `=` and in brackets.
 fn key(name: &str) -> String {
-    let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    if !name.is_empty() && name.chars().all(is_bare) {
-        name.to_owned()
-    } else {
-        quoted(name)
-    }
+    name.to_toml_key()
 }
 
 /// A line of a section; nothing where the value may hold a secret.
@@ -229,4 +226,44 @@ fn section_of(setting: &Setting) -> Option<&'static str> {
 /// A text for a comment, which ends with its line.
 fn one_line(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whatever_a_name_holds_it_is_read_as_the_same_name() {
+        for name in [
+            "bare-name_1",
+            "",
+            "a b",
+            "a.b",
+            "a\nb",
+            "a\r\nb",
+            "\n",
+            "tab\t",
+            "bell\u{7}",
+            "nul\0",
+            "\u{7f}",
+            "it's",
+            "say \"it\"",
+            "'\"\\",
+            "\"\"\"",
+            "ä",
+            "]",
+            "#",
+            "=",
+        ] {
+            let of_line = format!("{} = 1", key(name));
+            let of_table = format!("[hooks.{}]\nprompt = 1", key(name));
+            let line: toml::Table = of_line.parse().expect(name);
+            let table: toml::Table = of_table.parse().expect(name);
+            assert_eq!(line.keys().collect::<Vec<_>>(), [name]);
+            assert_eq!(
+                table["hooks"].as_table().expect(name).keys().collect::<Vec<_>>(),
+                [name]
+            );
+        }
+    }
 }

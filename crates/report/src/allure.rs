@@ -59,6 +59,7 @@ fn file(case: &Case<'_>, run: &str, tool: &str, start: u64, sources: &Sources, h
         label("suite", case.suite),
         label("verdict", case.word()),
     ];
+    labels.extend(case.elsewhere.map(|place| label("counted-in", place.word())));
     labels.extend(case.requirements.iter().map(|id| label("requirement", id)));
     let links = case.requirements.iter().filter_map(|id| {
         let url = sources.requirement(id)?.link.as_deref()?;
@@ -76,7 +77,7 @@ fn file(case: &Case<'_>, run: &str, tool: &str, start: u64, sources: &Sources, h
         "testCaseId": &history[..32],
         "fullName": line(&format!("{}: {}", case.suite, case.name)),
         "name": line(&case.name),
-        "status": status(case.verdict, how),
+        "status": status(case.counted(), how),
         "statusDetails": details,
         "stage": "finished",
         "start": start,

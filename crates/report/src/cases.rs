@@ -15,8 +15,30 @@ use tck_result::{Decision, MonitorResult, RunResult, TestResult};
 pub const RUN_SUITE: &str = "run";
 /// The case of that suite.
 pub const RUN_CASE: &str = "the run is complete and decided something";
+/// What stands in the place of the verdict of what does not apply.
+pub(super) const NOT_APPLICABLE: &str = "not applicable";
 /// The suite of the monitors.
 pub const MONITORS: &str = "monitors";
+
+/// Where the failure of a case is counted, when that is not the case itself: one mistake is one failure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Elsewhere {
+    /// In the tests that failed: they show all that a monitor has failed for.
+    Tests,
+    /// In the case of the requirement that it follows from.
+    Cause,
+}
+
+impl Elsewhere {
+    /// The place as a word.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Tests => "tests",
+            Self::Cause => "cause",
+        }
+    }
+}
 
 /// One case. Its texts hold what a device said: they are cleaned by the format that shows them.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,8 +51,12 @@ pub struct Case<'a> {
     pub title: &'a str,
     /// How long it took.
     pub seconds: f64,
-    /// How it ended; absent when it does not apply.
+    /// How it ended; none when nothing was decided, see [`absent`](Self::absent).
     pub verdict: Option<Verdict>,
+    /// What stands in the place of a verdict: it did not apply, or there was nothing to judge.
+    pub absent: &'static str,
+    /// Where its failure is counted, when that is not here: then no format counts it.
+    pub elsewhere: Option<Elsewhere>,
     /// The requirement of the worst decision.
     pub kind: &'a str,
     /// Why the verdict is not a pass, in one line.
@@ -61,7 +87,13 @@ impl Case<'_> {
     /// The verdict as a word.
     #[must_use]
     pub fn word(&self) -> &'static str {
-        self.verdict.map_or("not applicable", Verdict::word)
+        self.verdict.map_or(self.absent, Verdict::word)
+    }
+
+    /// The verdict that a format counts: none where it is counted elsewhere.
+    #[must_use]
+    pub fn counted(&self) -> Option<Verdict> {
+        self.verdict.filter(|_| self.elsewhere.is_none())
     }
 }
 
@@ -93,6 +125,8 @@ pub fn of_run(result: &RunResult) -> Vec<Case<'_>> {
         title: "",
         seconds: 0.0,
         verdict: Some(verdict),
+        absent: NOT_APPLICABLE,
+        elsewhere: None,
         kind: "",
         message,
         details: String::new(),
@@ -157,6 +191,8 @@ fn of_test(test: &TestResult) -> Case<'_> {
         title: &test.title,
         seconds: test.seconds,
         verdict,
+        absent: NOT_APPLICABLE,
+        elsewhere: None,
         kind: worst.map_or("", |decision| decision.requirement.as_str()),
         remark: match verdict {
             Some(Verdict::Warning) => Some(format!("warning: {message}\n\n{details}")),
@@ -211,35 +247,96 @@ fn of_monitor<'a>(monitor: &'a MonitorResult, told: bool, sources: &'a Sources) 
     let lines = findings.iter().map(|finding| {
         let first: Vec<String> = finding.first.iter().map(|seq| format!("#{seq}")).collect();
         format!(
-            "{}: {}: {} ({} times; first at {})",
+            "{}: {}: {} ({}; first at {})",
             finding.verdict,
             finding.requirement,
             finding.message,
-            finding.count,
+            statement::times(finding.count),
             first.join(", ")
         )
     });
     let details = lines.collect::<Vec<_>>().join("\n");
     let known = sources.monitor(&monitor.id);
     let kind = findings.first().map_or("", |finding| finding.requirement.as_str());
-    let (verdict, message) = if told {
-        (None, format!("the tests that failed show it: {kind}: {message}"))
-    } else {
-        (monitor.verdict, message.to_owned())
+    let message = match told {
+        true => format!("the tests that failed show it: {kind}: {message}"),
+        false => message.to_owned(),
     };
     Case {
         suite: MONITORS,
         name: monitor.id.clone(),
         title: &monitor.title,
         seconds: 0.0,
-        verdict,
+        verdict: monitor.verdict,
+        absent: "nothing to judge",
+        elsewhere: told.then_some(Elsewhere::Tests),
         kind,
         message,
-        remark: (told || verdict == Some(Verdict::Warning)).then(|| details.clone()),
+        remark: (told || monitor.verdict == Some(Verdict::Warning)).then(|| details.clone()),
         details,
         requirements: known.map_or_else(Vec::new, |known| {
             known.requirements.iter().map(String::as_str).collect()
         }),
         test: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::findings::tests::run;
+    use crate::junit::Inconclusive;
+    use crate::keys::Keys;
+    use crate::{allure, ctrf, junit};
+
+    #[test]
+    fn a_monitor_that_tests_have_told_keeps_its_verdict_and_is_counted_once() {
+        let told = run(&[("STATE-12", "fail", 5)], &[("STATE-12", &[5])]);
+        let sources = Sources::default();
+        let all = cases(&told, &sources);
+        let monitor = all.iter().find(|case| case.suite == MONITORS).expect("a monitor");
+        assert_eq!((monitor.word(), monitor.counted()), ("fail", None));
+        let found = ctrf::render(&told, &sources, Inconclusive::Error);
+        let found: serde_json::Value = serde_json::from_str(&found).expect("JSON");
+        let tests = found["results"]["tests"].as_array().expect("tests");
+        let shown = tests.iter().find(|test| test["name"] == "a/m").expect("a monitor");
+        assert_eq!(
+            (&shown["status"], &shown["rawStatus"], &shown["extra"]["countedIn"]),
+            (&"skipped".into(), &"fail".into(), &"tests".into())
+        );
+        let files = allure::render(&told, &sources, Inconclusive::Error);
+        let file = files
+            .iter()
+            .find(|(_, text)| text.contains("monitors: a/m"))
+            .expect("a monitor");
+        assert!(
+            file.1.contains("\"skipped\"") && file.1.contains("\"counted-in\""),
+            "{}",
+            file.1
+        );
+        let xml = junit::with_keys(&told, &sources, &Keys::default(), junit::Flavour::default()).expect("XML");
+        let case = xml
+            .lines()
+            .find(|line| line.contains("name=\"a/m\""))
+            .expect("a monitor");
+        for part in [
+            "<skipped type=\"fail\"",
+            "name=\"vda5050.verdict\" value=\"fail\"",
+            "name=\"vda5050.counted-in\" value=\"tests\"",
+        ] {
+            assert!(case.contains(part), "{part}: {case}");
+        }
+    }
+
+    #[test]
+    fn a_monitor_that_judged_nothing_says_so() {
+        let mut nothing = run(&[], &[]);
+        nothing.monitors[0].verdict = None;
+        let sources = Sources::default();
+        let all = cases(&nothing, &sources);
+        let monitor = all.iter().find(|case| case.suite == MONITORS).expect("a monitor");
+        assert_eq!(monitor.word(), "nothing to judge");
+        let xml = junit::render(&nothing, junit::Flavour::default()).expect("XML");
+        assert!(xml.contains("<skipped type=\"nothing to judge\""), "{xml}");
     }
 }

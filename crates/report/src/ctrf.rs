@@ -91,7 +91,7 @@ fn test(case: &Case<'_>, how: Inconclusive) -> Value {
     let how = if case.of_run() { Inconclusive::Error } else { how };
     let mut test = Map::from_iter([
         ("name".to_owned(), line(&case.name).into()),
-        ("status".to_owned(), status(case.verdict, how).into()),
+        ("status".to_owned(), status(case.counted(), how).into()),
         ("duration".to_owned(), millis(case.seconds).into()),
         ("rawStatus".to_owned(), case.word().into()),
         ("suite".to_owned(), json!([line(case.suite)])),
@@ -112,6 +112,9 @@ fn test(case: &Case<'_>, how: Inconclusive) -> Value {
     if !case.requirements.is_empty() {
         let all: Vec<_> = case.requirements.iter().map(|id| line(id)).collect();
         test.insert("labels".to_owned(), json!({ "requirement": all }));
+    }
+    if let Some(place) = case.elsewhere {
+        test.insert("extra".to_owned(), json!({ "countedIn": place.word() }));
     }
     if case.is_flaky() {
         test.insert("flaky".to_owned(), true.into());

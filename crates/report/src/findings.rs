@@ -259,7 +259,7 @@ fn row<'a, 'r>(all: &'r mut Vec<Finding<'a>>, id: &'a str, sources: &'a Sources)
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
     fn empty() -> Finding<'static> {
@@ -349,7 +349,7 @@ mod tests {
     }
 
     /// A run in which a test and a monitor have found things, by message.
-    fn run(decided: &[(&str, &str, u64)], monitor: &[(&str, &[u64])]) -> RunResult {
+    pub(crate) fn run(decided: &[(&str, &str, u64)], monitor: &[(&str, &[u64])]) -> RunResult {
         let decisions: Vec<serde_json::Value> = decided
             .iter()
             .map(|(requirement, verdict, witness)| {

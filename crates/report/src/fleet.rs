@@ -2,6 +2,7 @@
 
 use askama::Template;
 
+use super::statement;
 use tck_result::{FleetResult, ReactionTimes, RunResult};
 
 /// Width of the picture, of one bar, and the height bars have at most.
@@ -12,7 +13,11 @@ const LEFT: usize = 44;
 /// In one line: how many vehicles were commanded, and how fast.
 #[must_use]
 pub fn line(fleet: &FleetResult) -> String {
-    let mut text = format!("{} of {} vehicles commanded", fleet.commanded, fleet.vehicles);
+    let mut text = format!(
+        "{} of {} commanded",
+        fleet.commanded,
+        statement::many(fleet.vehicles, "vehicle")
+    );
     if let Some(reaction) = &fleet.reaction {
         text += &format!(
             "; from state to order: median {}, nine of ten within {}, longest {}",

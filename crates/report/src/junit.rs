@@ -17,7 +17,7 @@ mod xml;
 
 use junit_report::{Duration, OffsetDateTime, ReportBuilder, TestCase, TestResult as Outcome, TestSuite};
 
-use super::cases::{self, Case};
+use super::cases::{self, Case, Elsewhere, NOT_APPLICABLE};
 use super::findings::{Finding, findings};
 use super::keys::Keys;
 use super::sources::Sources;
@@ -127,7 +127,9 @@ pub struct Plain {
     /// Its name: the requirement.
     pub name: String,
     /// How it ended.
-    pub verdict: Option<Verdict>,
+    pub verdict: Verdict,
+    /// Where its failure is counted, when that is not here.
+    pub elsewhere: Option<Elsewhere>,
     /// What was found.
     pub text: String,
 }
@@ -143,10 +145,14 @@ pub fn plain(cases: &[Plain]) -> Result<String, JunitError> {
         let built = TestCase {
             name: attribute(&case.name),
             time: duration(0.0),
-            result: outcome(case.verdict, &case.name, message, &case.text, Inconclusive::Error),
+            result: match case.elsewhere {
+                Some(_) => skipped(case.verdict.word(), message),
+                None => outcome(case.verdict, &case.name, message, &case.text, Inconclusive::Error),
+            },
             classname: Some(attribute(&case.suite)),
             filepath: None,
-            system_out: (case.verdict == Some(Verdict::Warning)).then(|| cdata(&format!("warning: {}", case.text))),
+            system_out: (case.verdict == Verdict::Warning && case.elsewhere.is_none())
+                .then(|| cdata(&format!("warning: {}", case.text))),
             system_err: None,
         };
         match groups.last_mut().filter(|(name, _)| *name == case.suite) {
@@ -223,7 +229,10 @@ fn built(case: &Case<'_>, how: Inconclusive) -> TestCase {
     TestCase {
         name: attribute(&case.name),
         time: duration(case.seconds),
-        result: outcome(case.verdict, case.kind, &case.message, &case.details, how),
+        result: match case.counted() {
+            Some(verdict) => outcome(verdict, case.kind, &case.message, &case.details, how),
+            None => skipped(case.word(), &case.message),
+        },
         classname: Some(attribute(case.suite)),
         filepath: None,
         system_out: case.remark.as_deref().map(cdata),
@@ -232,31 +241,35 @@ fn built(case: &Case<'_>, how: Inconclusive) -> TestCase {
 }
 
 /// The outcome for a verdict; `kind` is the requirement id of a fail.
-fn outcome(verdict: Option<Verdict>, kind: &str, message: &str, cause: &str, how: Inconclusive) -> Outcome {
+fn outcome(verdict: Verdict, kind: &str, message: &str, cause: &str, how: Inconclusive) -> Outcome {
     let message = attribute(message);
     let cause = (!cause.is_empty()).then(|| cdata(cause));
     match verdict {
-        Some(Verdict::Pass | Verdict::Warning) => Outcome::Success,
-        Some(Verdict::Fail) => Outcome::Failure {
+        Verdict::Pass | Verdict::Warning => Outcome::Success,
+        Verdict::Fail => Outcome::Failure {
             type_: attribute(kind),
             message,
             cause,
         },
-        Some(Verdict::Inconclusive) if how == Inconclusive::Skip => Outcome::SkippedWithCause {
+        Verdict::Inconclusive if how == Inconclusive::Skip => Outcome::SkippedWithCause {
             type_: Verdict::Inconclusive.word().to_owned(),
             message,
             cause,
         },
-        Some(undecided @ (Verdict::Inconclusive | Verdict::Error)) => Outcome::Error {
-            type_: undecided.word().to_owned(),
+        Verdict::Inconclusive | Verdict::Error => Outcome::Error {
+            type_: verdict.word().to_owned(),
             message,
             cause,
         },
-        None => Outcome::SkippedWithCause {
-            type_: "not applicable".to_owned(),
-            message,
-            cause: None,
-        },
+    }
+}
+
+/// The outcome of what is not counted: it has no verdict, or its failure is counted elsewhere.
+fn skipped(word: &str, message: &str) -> Outcome {
+    Outcome::SkippedWithCause {
+        type_: word.to_owned(),
+        message: attribute(message),
+        cause: None,
     }
 }
 
@@ -271,12 +284,12 @@ fn requirement_case<'a>(
     let link = known.and_then(|known| known.link.as_deref());
     let link = link.map_or_else(String::new, |link| format!("\n{link}"));
     // What applies and was not decided is no pass, and what no test can decide is nobody's fault.
-    let verdict = match statement::gap(requirement) {
-        Some(Gap::NotDecided) => Some(Verdict::Inconclusive),
-        // A mistake is one failure, and what follows from it none.
-        _ if finding.is_some_and(|finding| finding.follows.is_some()) => None,
-        _ => requirement.verdict,
+    let (verdict, absent) = match statement::gap(requirement) {
+        Some(Gap::NotDecided) => (Some(Verdict::Inconclusive), NOT_APPLICABLE),
+        Some(Gap::NotTestable) => (None, "not testable"),
+        Some(Gap::NotApplicable) | None => (requirement.verdict, NOT_APPLICABLE),
     };
+    let follows = verdict.is_some() && finding.is_some_and(|finding| finding.follows.is_some());
     let gap = requirement.not_decided.as_ref().map(ToString::to_string);
     let message = match (finding, gap) {
         (Some(finding), _) => finding.seen.clone(),
@@ -290,8 +303,10 @@ fn requirement_case<'a>(
         title: asks,
         seconds: 0.0,
         verdict,
+        absent,
+        elsewhere: follows.then_some(Elsewhere::Cause),
         kind: &requirement.id,
-        remark: (verdict == Some(Verdict::Warning)).then(|| format!("warning: {message}\n\n{by}")),
+        remark: (verdict == Some(Verdict::Warning) && !follows).then(|| format!("warning: {message}\n\n{by}")),
         message,
         details: by,
         requirements: vec![&requirement.id],

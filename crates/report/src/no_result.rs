@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use serde_json::json;
 
-use super::cases::{Case, RUN_CASE, RUN_SUITE};
+use super::cases::{Case, NOT_APPLICABLE, RUN_CASE, RUN_SUITE};
 use super::clean::{block, line};
 use super::junit::{self, JunitError, Plain};
 use super::markdown::escaped;
@@ -56,6 +56,8 @@ impl NoResult {
             title: "",
             seconds: 0.0,
             verdict: Some(Verdict::Error),
+            absent: NOT_APPLICABLE,
+            elsewhere: None,
             kind: "",
             message: self.titles(),
             details: self.texts(),
@@ -73,7 +75,8 @@ impl NoResult {
         junit::plain(&[Plain {
             suite: RUN_SUITE.to_owned(),
             name: RUN_CASE.to_owned(),
-            verdict: Some(Verdict::Error),
+            verdict: Verdict::Error,
+            elsewhere: None,
             // The first line becomes the message of the case.
             text: format!("{}\n\n{}", self.titles(), self.texts()),
         }])

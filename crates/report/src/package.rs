@@ -41,6 +41,9 @@ pub enum PackageError {
     /// The package would lie in the bundle, which would not be what its manifest says any more.
     #[error("the package would lie in the bundle that it packs; name a file elsewhere")]
     Inside,
+    /// Something else than a file is there, such as a pipe or a link, and is not replaced.
+    #[error("{} is there and is no regular file; name another one", .0.display())]
+    NoFile(PathBuf),
     /// A paper cannot be written.
     #[error("cannot write the papers: {0}")]
     Paper(String),
@@ -110,7 +113,8 @@ pub fn refused(result: &RunResult) -> Vec<String> {
 #[must_use]
 pub fn notices(result: &RunResult) -> Vec<&'static str> {
     let command = result.setting("device.command").is_some();
-    let notice = "the command that starts the device stands in the bundle as it was given: see that it holds no secret";
+    let notice = "the command that starts the device stands in the bundle (result, report, journal) and in settings.json as it was \
+                  given: see that it holds no secret";
     command.then_some(notice).into_iter().collect()
 }
 
@@ -128,6 +132,9 @@ impl Package<'_> {
         let bundle = self.folder.canonicalize().map_err(failed(self.folder))?;
         if place.starts_with(&bundle) {
             return Err(PackageError::Inside);
+        }
+        if std::fs::symlink_metadata(file).is_ok_and(|facts| !facts.is_file()) {
+            return Err(PackageError::NoFile(file.to_owned()));
         }
         std::fs::create_dir_all(beside).map_err(failed(beside))?;
         let papers = self.papers()?;
@@ -212,6 +219,13 @@ impl Package<'_> {
         for why in refused {
             let _ = writeln!(text, "  - {why}");
         }
+        let notices = notices(self.result);
+        if !notices.is_empty() {
+            text.push_str("\nWhat to look at before it is handed on\n");
+        }
+        for notice in notices {
+            let _ = writeln!(text, "  - {notice}");
+        }
         text.push_str("\nWhat is in it\n");
         let rows = [
             (
@@ -232,7 +246,7 @@ impl Package<'_> {
             ),
             (
                 "settings.json",
-                "the profile as it took effect, each setting with its origin; no password of a broker, but the command of the device as it was given",
+                "the profile as it took effect, each setting with its origin; no password of a broker",
             ),
             (
                 "attestation.json",
@@ -294,5 +308,40 @@ impl Package<'_> {
             .iter()
             .map(|one| json!({ "name": line(&one.name), "value": line(&one.value), "origin": line(&one.origin) }));
         format!("{:#}\n", serde_json::Value::Array(all.collect()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tck_journal::event::Setting;
+
+    #[test]
+    fn the_command_of_the_device_is_named_in_the_package_where_there_is_one() {
+        let mut result = crate::findings::tests::run(&[], &[]);
+        let sources = Sources::default();
+        let manifest = Manifest {
+            format: manifest::FORMAT.to_owned(),
+            files: Vec::new(),
+            root: "0".repeat(64),
+        };
+        let read_me = |result: &RunResult| {
+            let package = Package {
+                folder: Path::new("run"),
+                result,
+                sources: &sources,
+                manifest: &manifest,
+            };
+            package.read_me(false)
+        };
+        let without = read_me(&result);
+        assert!(!without.contains("the command that starts"), "{without}");
+        result.settings = vec![Setting::shown("device.command", "./agv --token x", "device.toml")];
+        let with = read_me(&result);
+        assert!(
+            with.contains("the command that starts the device") && with.contains("no secret"),
+            "{with}"
+        );
+        assert!(!with.contains("--token"), "{with}");
     }
 }

@@ -189,6 +189,21 @@ pub fn many(count: usize, one: &str) -> String {
     }
 }
 
+/// `once`, `2 times`.
+#[must_use]
+pub fn times(count: u64) -> String {
+    match count {
+        1 => "once".to_owned(),
+        _ => format!("{count} times"),
+    }
+}
+
+/// The word of a pair that goes with a count: `was` or `were`.
+#[must_use]
+pub fn verb(count: usize, one: &'static str, several: &'static str) -> &'static str {
+    if count == 1 { one } else { several }
+}
+
 /// Manufacturer and serial number, made safe to show.
 #[must_use]
 pub fn device(result: &RunResult) -> String {

@@ -20,7 +20,7 @@ pub use self::merged::{MergeTrouble, MergedBundle, MergedPart, MergedParts, Merg
 pub use self::message_coverage::{ActionCoverage, MemberCoverage, MessageCoverage, NeverShown, TopicCoverage, Unseen};
 pub use self::not_decided::NotDecided;
 pub use self::on_word::{OnWord, WordKind};
-pub use self::parts::{Gathered, Part, gathered, most_common};
+pub use self::parts::{Gathered, Part, gathered, most_common, others};
 pub use self::program::{ProgramEnd, ProgramResult};
 pub use self::sent::{Sent, SentMember};
 use tck_base::verdict::{Accumulated, Verdict};

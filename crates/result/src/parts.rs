@@ -18,7 +18,7 @@ pub trait Part {
     /// The hash of what it rests on, which tells it from any other part.
     fn evidence(&self) -> &str;
 
-    /// What it is called, such as `the run 1f2e3d4c`.
+    /// What it is called, with the folder in which it is, such as `the run 1f2e3d4c in parts/2`.
     fn name(&self) -> String;
 
     /// What all parts have in common, by what it is called.
@@ -93,7 +93,7 @@ pub fn gathered<P: Part>(parts: &[P]) -> Option<Gathered<'_, P>> {
     let alike: Vec<&P> = given
         .iter()
         .copied()
-        .filter(|part| difference(*part, &common).is_none())
+        .filter(|part| difference(*part, &common, "").is_none())
         .collect();
     let shard = alike.first()?.shard()?;
     let (of, filled) = (shard.of, shard.filled);
@@ -103,7 +103,7 @@ pub fn gathered<P: Part>(parts: &[P]) -> Option<Gathered<'_, P>> {
     for part in given {
         let beyond =
             || (part.index() > filled).then(|| format!("there is nothing to do for part {} of {of}", part.index()));
-        let why = difference(part, &common)
+        let why = difference(part, &common, &others(&alike))
             .or_else(|| part.stranger(&alike))
             .or_else(beyond);
         if let Some(why) = &why {
@@ -148,8 +148,16 @@ pub fn gathered<P: Part>(parts: &[P]) -> Option<Gathered<'_, P>> {
     Some(Gathered { all, own, of, troubles })
 }
 
-/// What a part does not have in common with the others.
-fn difference<P: Part>(part: &P, common: &BTreeMap<String, String>) -> Option<String> {
+/// What these are called, as the other side of a comparison: one by its name.
+pub fn others<P: Part>(parts: &[&P]) -> String {
+    match parts {
+        [one] => one.name(),
+        _ => "the others".to_owned(),
+    }
+}
+
+/// What a part does not have in common with the others, and what those are called.
+fn difference<P: Part>(part: &P, common: &BTreeMap<String, String>, others: &str) -> Option<String> {
     if part.shard().is_none() {
         return Some("it was made without --shard".to_owned());
     }
@@ -163,8 +171,60 @@ fn difference<P: Part>(part: &P, common: &BTreeMap<String, String>) -> Option<St
         None => "not set".to_owned(),
     };
     Some(format!(
-        "its {name} is {}, and that of the others {}",
+        "its {name} is {}, and that of {others} {}",
         shown(own.get(name)),
         shown(common.get(name))
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A part that was made of a selection.
+    struct Made {
+        shard: ShardRecord,
+        folder: &'static str,
+    }
+
+    impl Part for Made {
+        fn shard(&self) -> Option<&ShardRecord> {
+            Some(&self.shard)
+        }
+
+        fn evidence(&self) -> &str {
+            self.folder
+        }
+
+        fn name(&self) -> String {
+            format!("the run in {}", self.folder)
+        }
+
+        fn facts(&self) -> BTreeMap<String, String> {
+            BTreeMap::new()
+        }
+    }
+
+    fn made(index: usize, selection: &str, folder: &'static str) -> Made {
+        let shard = ShardRecord {
+            index,
+            of: 2,
+            origin: "--shard".to_owned(),
+            filled: 2,
+            whole: 2,
+            selection: selection.to_owned(),
+        };
+        Made { shard, folder }
+    }
+
+    #[test]
+    fn of_two_parts_the_foreign_one_is_named_with_what_differs_from_the_other() {
+        let parts = [made(1, "a", "parts/1"), made(2, "b", "parts/2")];
+        let gathered = gathered(&parts).expect("parts");
+        let foreign = gathered.troubles.iter().find(|one| one.kind == TroubleKind::Foreign);
+        assert_eq!(
+            foreign.expect("a foreign part").text,
+            "the run in parts/2 is no part of this: its selection is `b`, and that of the run in parts/1 `a`"
+        );
+    }
 }

@@ -216,12 +216,27 @@ impl Counterpart {
             Role::Agv => "The mock vehicles",
         };
         let taken = self.in_run();
-        let what = if taken.is_empty() {
-            "in nothing that a run permits".to_owned()
-        } else {
-            format!("in what a run permits: {}", taken.join(", "))
-        };
-        format!("{who} behaved like {} (counterpart {}) {what}.", self.title, self.name)
+        let (title, name) = (self.in_sentence(), &self.name);
+        if taken.is_empty() {
+            return format!(
+                "`--like {name}` had no effect: {title} (counterpart {name}) has no habit that a run may take, and {} behaved as always.",
+                who.to_lowercase()
+            );
+        }
+        format!(
+            "{who} behaved like {title} (counterpart {name}) in what a run permits: {}.",
+            taken.join(", ")
+        )
+    }
+
+    /// What it is, within a sentence: an article is written small there.
+    fn in_sentence(&self) -> String {
+        for (large, small) in [("A ", "a "), ("An ", "an "), ("The ", "the ")] {
+            if let Some(rest) = self.title.strip_prefix(large) {
+                return format!("{small}{rest}");
+            }
+        }
+        self.title.clone()
     }
 }
 

@@ -18,6 +18,7 @@ mod matrix;
 mod metadata;
 pub mod model;
 mod read;
+mod read_monitor;
 mod recordings;
 mod schema_cases;
 mod source;

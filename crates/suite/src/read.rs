@@ -1,4 +1,4 @@
-//! One file into tests or a monitor: header keys, the rows of a table, the rule.
+//! One file into tests: header keys, which monitors have as well, and the rows of a table.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -7,20 +7,18 @@ use super::CheckInfo;
 use super::conversation::conversation;
 use super::course::course_need;
 use super::expand::Fill;
-use super::fields::{Fields, Problems, text_of};
+use super::fields::{Fields, Problems};
 use super::grammar::need;
 use super::lint::{self, HeaderPlaces, Vocabulary};
 use super::matrix;
 use super::metadata::{maturity, tags};
-use super::model::{About, Binding, CourseNeed, Drawn, Monitor, Need, Rule, Test};
-use super::recordings::recordings;
+use super::model::{CourseNeed, Drawn, Need, Test};
 use super::schema_cases;
 use super::source::{States, parse};
-use super::steps::{StepReader, check_use, checks, version_range};
-use super::terms::pattern;
+use super::steps::{StepReader, version_range};
 use tck_base::diagnostic::{Diagnostic, Source, Span};
 use tck_base::yaml::{Kind, Node};
-use tck_pack::{RequirementId, Role, VersionRange};
+use tck_pack::{Role, VersionRange};
 
 const TEST_KEYS: &[&str] = &[
     "test",
@@ -39,25 +37,6 @@ const TEST_KEYS: &[&str] = &[
     "given",
     "steps",
     "finally",
-];
-const MONITOR_KEYS: &[&str] = &[
-    "monitor",
-    "title",
-    "device",
-    "spec",
-    "needs",
-    "why",
-    "checks",
-    "about",
-    "check",
-    "with",
-    "instead-of",
-    "topic",
-    "always",
-    "when",
-    "never",
-    "hides",
-    "recordings",
 ];
 const ROLES: [(&str, Role); 2] = [("agv", Role::Agv), ("master-control", Role::MasterControl)];
 
@@ -90,15 +69,15 @@ pub(super) fn named(fields: &Fields<'_>, key: &str, name: &str, at: &Span, probl
 }
 
 /// What tests and monitors have in common.
-struct Header {
-    title: String,
-    device: Option<Role>,
-    spec: Option<VersionRange>,
-    needs: Vec<(Need, Span)>,
-    why: String,
+pub(super) struct Header {
+    pub(super) title: String,
+    pub(super) device: Option<Role>,
+    pub(super) spec: Option<VersionRange>,
+    pub(super) needs: Vec<(Need, Span)>,
+    pub(super) why: String,
 }
 
-fn header(fields: &Fields<'_>, at: &Span, problems: &mut Problems) -> Header {
+pub(super) fn header(fields: &Fields<'_>, at: &Span, problems: &mut Problems) -> Header {
     let owned = |text: Option<&str>| text.map(|text| text.trim().to_owned()).unwrap_or_default();
     Header {
         title: owned(fields.need_text("title", at, problems)),
@@ -436,170 +415,4 @@ impl TestReader<'_> {
         lint::test(&test, &places, self.vocabulary, self.known, problems);
         Some(test)
     }
-}
-
-/// The monitor of a file. `name` is what its path asks for.
-pub(super) fn read_monitor(
-    source: &Arc<Source>,
-    name: Option<&str>,
-    vocabulary: &dyn Vocabulary,
-    known: &[CheckInfo],
-    lint: bool,
-    problems: &mut Problems,
-) -> Option<Monitor> {
-    let root = parse(source, problems)?;
-    let fields = Fields::of(&root, problems)?;
-    fields.only(&[MONITOR_KEYS], problems);
-    let at = start(&root);
-    if let Some(name) = name {
-        named(&fields, "monitor", name, &at, problems);
-    }
-    let id = fields.need_text("monitor", &at, problems).map(str::to_owned);
-    let header = header(&fields, &at, problems);
-    let bindings = checks(&fields, problems);
-    if fields.need("checks", &at, problems).is_some() && bindings.is_empty() {
-        problems.at(
-            "decides-nothing",
-            &at,
-            "a monitor that decides nothing",
-            "`checks` is empty",
-        );
-    }
-    let rule = rule(&fields, &at, problems);
-    let recordings = recordings(&fields, rule.as_ref(), problems);
-    let instead_of = fields.get("instead-of", problems).and_then(|node| {
-        let requirement = RequirementId::from(text_of(node, problems)?);
-        Some(Binding {
-            requirement,
-            span: node.span.clone(),
-        })
-    });
-    let hides: Vec<&Node> = fields.list("hides", problems).iter().collect();
-    let (needs, need_places): (Vec<_>, Vec<_>) = header.needs.into_iter().unzip();
-    let monitor = Monitor {
-        id: id?,
-        title: header.title,
-        device: header.device,
-        spec: header.spec?,
-        needs,
-        checks: bindings,
-        instead_of,
-        recordings: recordings?,
-        about: about(&fields, problems),
-        why: header.why,
-        rule: rule?,
-        hides: hides
-            .iter()
-            .filter_map(|node| text_of(node, problems).map(str::to_owned))
-            .collect(),
-        source: Arc::clone(source),
-    };
-    if !lint {
-        return Some(monitor);
-    }
-    let places = HeaderPlaces {
-        hides: hides.iter().map(|node| node.span.clone()).collect(),
-        spec: fields
-            .get("spec", &mut Problems::default())
-            .map(|node| node.span.clone()),
-        start: at,
-        moves: None,
-        needs: need_places,
-        complete: true,
-    };
-    let topic_place = fields
-        .get("topic", &mut Problems::default())
-        .map(|node| node.span.clone());
-    lint::monitor(&monitor, &places, topic_place.as_ref(), vocabulary, known, problems);
-    Some(monitor)
-}
-
-/// Requirement id to topic to picture.
-fn about(fields: &Fields<'_>, problems: &mut Problems) -> Vec<About> {
-    let Some(inner) = fields
-        .get("about", problems)
-        .and_then(|node| Fields::of(node, problems))
-    else {
-        return Vec::new();
-    };
-    let mut all = Vec::new();
-    for (key, value) in inner.entries() {
-        let Some(id) = text_of(key, problems) else { continue };
-        let Some(subject) = Fields::of(value, problems) else {
-            continue;
-        };
-        let [(topic, picture)] = subject.entries() else {
-            let label = "one topic, and what a message on it shows";
-            problems.at(
-                "about-one-topic",
-                &value.span,
-                format!("`{id}` is about one topic"),
-                label,
-            );
-            continue;
-        };
-        let (Some(topic), Some(pattern)) = (text_of(topic, problems), pattern(picture, problems)) else {
-            continue;
-        };
-        all.push(About {
-            requirement: Binding {
-                requirement: RequirementId::from(id),
-                span: key.span.clone(),
-            },
-            topic: topic.to_owned(),
-            pattern,
-        });
-    }
-    all
-}
-
-fn rule(fields: &Fields<'_>, at: &Span, problems: &mut Problems) -> Option<Rule> {
-    let written: Vec<&str> = ["check", "always", "never"]
-        .into_iter()
-        .filter(|key| fields.has(key))
-        .collect();
-    if written.len() != 1 {
-        problems.at(
-            "monitor-rule",
-            at,
-            "a monitor has one rule",
-            "needs one of `check:`, `always:` and `never:`",
-        );
-        return None;
-    }
-    let unneeded: &[&str] = match written[0] {
-        "check" => &["topic", "when"],
-        "always" => &["with", "instead-of"],
-        _ => &["with", "when", "instead-of"],
-    };
-    for key in unneeded {
-        if let Some(name) = fields.key(key) {
-            problems.at(
-                "conflicting-keys",
-                &name.span,
-                format!("`{key}` beside `{}`", written[0]),
-                "has no meaning here",
-            );
-        }
-    }
-    if written[0] == "check" {
-        return check_use(fields, problems).map(Rule::Check);
-    }
-    let topic = text_of(fields.need("topic", at, problems)?, problems)?.to_owned();
-    let picture = pattern(fields.get(written[0], problems)?, problems);
-    if written[0] == "never" {
-        return Some(Rule::Never {
-            topic,
-            pattern: picture?,
-        });
-    }
-    let when = match fields.get("when", problems) {
-        Some(node) => Some(pattern(node, problems)?),
-        None => None,
-    };
-    Some(Rule::Always {
-        topic,
-        when,
-        pattern: picture?,
-    })
 }

@@ -13,14 +13,14 @@ use tokio::sync::watch;
 use super::super::ending;
 use super::super::problem::Problem;
 use tck_campaign::{Entry, Place, PlaceError, Settled, Stand};
-use tck_report::statement::many;
+use tck_report::statement::{many, verb};
 
 /// How often it is looked whether a run has ended.
 const LOOK: Duration = Duration::from_millis(50);
 /// Variables that are flags of a call, and would change what the file says.
-const NOT_INHERITED: [&str; 3] = ["VDA5050_TCK_PROFILE", "VDA5050_TCK_OUT", "VDA5050_TCK_FORMAT"];
+pub(super) const NOT_INHERITED: [&str; 3] = ["VDA5050_TCK_PROFILE", "VDA5050_TCK_OUT", "VDA5050_TCK_FORMAT"];
 /// The setting that says where a device connects.
-const LISTEN: &str = "VDA5050_TCK_BENCH_LISTEN";
+pub(super) const LISTEN: &str = "VDA5050_TCK_BENCH_LISTEN";
 /// The exit codes of a call that was refused, or that had nothing to go on with.
 const REFUSED: [u8; 2] = [2, 4];
 
@@ -136,8 +136,9 @@ impl Crew {
         let done = self.jobs.iter().filter(|job| job.settled().is_some()).count();
         if done > 0 {
             super::super::tell(&format!(
-                "{done} of {} were carried out before",
-                many(self.jobs.len(), "run")
+                "{done} of {} {} carried out before",
+                many(self.jobs.len(), "run"),
+                verb(done, "was", "were")
             ));
         }
         Ok(())
@@ -252,11 +253,7 @@ impl Job {
         };
         File::create(&events).map_err(failed(&events))?;
         let output = self.place.output();
-        let printed = File::options()
-            .append(true)
-            .create(true)
-            .open(&output)
-            .map_err(failed(&output))?;
+        let printed = self.place.begin_output(attempt).map_err(environment)?;
         let program = std::env::current_exe().map_err(|error| Problem::Environment(error.to_string()))?;
         let mut command = Command::new(program);
         match &left {

@@ -1,5 +1,6 @@
 //! `campaign`: each device with each suite, every one a run of this program in a process of its own.
 
+mod beforehand;
 mod crew;
 
 use std::fs::{File, TryLockError};
@@ -10,18 +11,30 @@ use clap::Parser as _;
 use super::args::{Campaign as Arguments, Cli, Format};
 use super::exit::Exit;
 use super::problem::Problem;
+use super::within;
 use crew::{Crew, Job};
 use tck_base::diagnostic::{Diagnostic, Source};
-use tck_campaign::{Line, Place, PlaceError, Plan, Settled, Stand, Summary};
+use tck_campaign::{Entry, Line, Place, PlaceError, Plan, Settled, Stand, Summary};
 use tck_run::write_whole;
 
 /// `campaign`.
 pub fn campaign(arguments: &Arguments) -> Result<Exit, Problem> {
     let plan = read(&arguments.file)?;
     let root = folder(arguments, &plan);
-    std::fs::create_dir_all(&root).map_err(|error| unwritable(&root, &error))?;
+    within::refuse_folder("out", &root)?;
     // What the events of a run name is found from everywhere.
     let root = std::path::absolute(&root).map_err(|error| unwritable(&root, &error))?;
+    let begins_anew = |entry: &&Entry| match Place::of(&root, entry).stand() {
+        Stand::New => true,
+        // It goes on with what was begun.
+        Stand::BrokenOff(_) => false,
+        Stand::Settled(settled) => arguments.retry && is_tried_again(&settled),
+    };
+    let wrong = beforehand::mistakes(plan.entries.iter().filter(begins_anew), &root);
+    if !wrong.is_empty() {
+        return Err(wrong.into());
+    }
+    std::fs::create_dir_all(&root).map_err(|error| unwritable(&root, &error))?;
     // As long as this lives, no other campaign works in the folder.
     let _alone = alone(&root)?;
     let mut entries = Vec::new();
@@ -30,9 +43,7 @@ pub fn campaign(arguments: &Arguments) -> Result<Exit, Problem> {
         place.begin(&entry).map_err(|error| refused(&entry.name(), &error))?;
         if arguments.retry
             && let Stand::Settled(settled) = place.stand()
-            && [Exit::Usage, Exit::NothingToDo, Exit::Broken]
-                .map(Exit::code)
-                .contains(&settled.exit)
+            && is_tried_again(&settled)
         {
             place.again().map_err(|error| refused(&entry.name(), &error))?;
         }
@@ -55,6 +66,13 @@ pub fn campaign(arguments: &Arguments) -> Result<Exit, Problem> {
         return Ok(Exit::Interrupted);
     }
     Ok(exit_of(summary.exit))
+}
+
+/// Whether `--retry` runs an entry once more: nothing was judged.
+fn is_tried_again(settled: &Settled) -> bool {
+    [Exit::Usage, Exit::NothingToDo, Exit::Broken]
+        .map(Exit::code)
+        .contains(&settled.exit)
 }
 
 /// Reads the file, and holds each call that comes of it against the command line.

@@ -45,7 +45,7 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
         &library.rules.hooks,
     )?;
     if !arguments.stimuli {
-        reference::is_tested(&Asked::of_explore(arguments), &effective, &surroundings)?;
+        reference::is_tested(&Asked::of_explore(arguments), &effective, &surroundings, &super::tell)?;
     }
     let pack = tck_run::pack_of(&library, &effective)?;
     if !pack.judges_devices() {

@@ -94,7 +94,11 @@ pub(super) fn explored(
         described("REMARK", shown, catalogue, place, &mut text);
     }
     if !explored.left_out.is_empty() {
-        let _ = writeln!(text, "{} stimuli do not apply to the device:", explored.left_out.len());
+        let what = match explored.left_out.len() {
+            1 => "1 stimulus does not apply".to_owned(),
+            count => format!("{count} stimuli do not apply"),
+        };
+        let _ = writeln!(text, "{what} to the device:");
         let mut reasons: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
         for (name, why) in &explored.left_out {
             reasons.entry(why).or_default().push(name);

@@ -1,6 +1,7 @@
 //! `run`: test a device, write the evidence, say the verdict.
 
 mod conclude;
+mod prepared;
 mod resume;
 mod saving;
 
@@ -10,11 +11,12 @@ use std::sync::Arc;
 
 use tokio::sync::watch;
 
+use prepared::prepared;
 use resume::{AboutRun, Earlier};
 use saving::saving;
 
 use super::args;
-use super::device::{check_faults, tolerate};
+use super::device::tolerate;
 use super::ending::Ending;
 use super::events::{About, Followed};
 use super::exit::Exit;
@@ -28,7 +30,7 @@ use crate::ui::Prompter;
 use tck_base::clock::WallClock;
 use tck_base::diagnostic::{Diagnostic, Source, Span};
 use tck_base::secrets::Secrets;
-use tck_base::shard::{ChosenShard, Shard};
+use tck_base::shard::Shard;
 use tck_journal::event::Setting;
 use tck_journal::file::JournalWriter;
 use tck_journal::{Reason, Vantage};
@@ -40,13 +42,15 @@ use tck_net::link::mqtt::BrokerChoice;
 use tck_pack::Participant;
 use tck_pack::{Pack, Role};
 use tck_page::Page;
-use tck_profile::{self as profile, Effective, Surroundings};
+use tck_profile::{Effective, Surroundings};
 use tck_report::statement::many;
 use tck_run::{
-    Answering, AnsweringError, Bundle, Criteria, Hold, LATEST, LiveRun, Person, ProfileContext, Request,
-    RequestBuilder, RunError, RunPlan, VirtualRun, fleet_names, going_on_at, pack_of, run_virtually,
+    Answering, AnsweringError, Bundle, Hold, LATEST, LiveRun, Person, ProfileContext, Request, RunError, RunPlan,
+    VirtualRun, going_on_at, run_virtually,
 };
 use tck_simulate::{BuiltIn, ReferenceAgv, ReferenceMasterControl, USUAL_FLEET};
+
+pub(super) use prepared::check;
 
 /// What `run` and `certify` have in common.
 struct Job {
@@ -73,71 +77,9 @@ struct Job {
 /// `run`.
 pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit, Problem> {
     let surroundings = Surroundings::of_process();
-    if arguments.in_virtual_time && arguments.people.page.address.is_some() {
-        return Err(page::in_virtual_time());
-    }
-    // What a run that goes on is a part of stands in its journal.
-    let part = match arguments.selection.resume {
-        Some(_) => None,
-        None => super::shard::chosen(arguments.shard, &surroundings)?,
-    };
     let library = crate::assets::library(arguments.suites.own())?;
-    let effective = profile::load(
-        arguments.device.profile.as_deref(),
-        &[
-            arguments.device.settings(),
-            arguments.people.page.settings(),
-            arguments.said.clone(),
-        ]
-        .concat(),
-        &surroundings,
-        &library.rules.hooks,
-    )?;
-    let built_in = reference::is_tested(&Asked::of_run(arguments), &effective, &surroundings)?;
-    if let Some(own) = library.own() {
-        super::tell(&own);
-    }
-    let pack = pack_of(&library, &effective)?;
-    let role = effective.profile.device.role;
-    let earlier = match &arguments.selection.resume {
-        Some(folder) => Some(Earlier::read(folder, &library.tests(role, &pack.id), &library)?),
-        None => None,
-    };
-    let mut wanted = asked(arguments, part, earlier.as_ref());
-    // A master control that the run starts itself is one of several, and one that is there is shared.
-    if role == Role::MasterControl && !built_in && effective.profile.device.command.is_none() {
-        let count = arguments.vehicles.map(|count| count as usize);
-        wanted = wanted.vehicles(fleet_names(&effective.profile, count));
-    }
-    let mut request = wanted.build(role, &library, &pack)?;
-    let harness = Harness::of_run(arguments.like.as_deref(), role, &mut request)?;
-    if role == Role::MasterControl && arguments.vehicle.0 != tck_simulate::Vehicle::default() {
-        let title = "`--vehicle` is for the reference AGV, and a master control is tested here";
-        return Err(Diagnostic::whole("usage", title).into());
-    }
-    if role == Role::Agv && arguments.vehicles.is_some() {
-        let title = "`--vehicles` is for a master control under test, and an AGV is tested here";
-        return Err(Diagnostic::whole("usage", title)
-            .hint("add `--role master-control`")
-            .into());
-    }
+    let (mut job, built_in) = prepared(arguments, library, &surroundings, &super::tell)?;
     super::open_files::allow(arguments.vehicles.unwrap_or_default());
-    check_faults(role, &arguments.fault)?;
-    let mut job = Job {
-        desk: Prompter::new(watch::channel(false).0),
-        page: None,
-        request,
-        library,
-        pack,
-        effective,
-        output: arguments.output.clone(),
-        no_motion: arguments.device.no_motion,
-        certifies: arguments.certifies,
-        vehicles: arguments.vehicles.map(|count| count as usize),
-        harness,
-        earlier,
-        quit: None,
-    };
     if arguments.selection.plan {
         if !arguments.pipeline.renderings.is_empty() {
             let title = "a plan runs nothing, so there is nothing that `--as` could write";
@@ -191,48 +133,6 @@ pub fn run_command(arguments: &args::Run, outputs: &Outputs<'_>) -> Result<Exit,
     runtime.shutdown_background();
     desk.at_rest();
     outcome
-}
-
-/// What the command line asks for.
-fn asked(arguments: &args::Run, part: Option<ChosenShard>, earlier: Option<&Earlier>) -> RequestBuilder {
-    let wanted = &arguments.selection;
-    let repeat = earlier.map_or(1, |earlier| earlier.repeat).max(wanted.repeat);
-    let mut asked = RequestBuilder::new()
-        .criteria(Criteria {
-            patterns: arguments.tests.clone(),
-            requirements: wanted.requirement.clone(),
-            chapters: wanted.chapter.clone(),
-            filters: wanted.filter.clone(),
-            exclude: wanted.exclude.clone(),
-            failed_in: wanted.last_failed.then(|| arguments.output.out.clone()),
-        })
-        .command(std::env::args().collect())
-        .repeat(repeat);
-    if let Some(earlier) = earlier {
-        asked = asked.left(earlier.tests.clone()).part(earlier.part());
-    }
-    if let Some(part) = part {
-        asked = asked.shard(part);
-    }
-    if let Some(seed) = arguments.seed {
-        asked = asked.seed(seed);
-    }
-    if arguments.thorough {
-        asked = asked.thorough();
-    }
-    if arguments.certificate {
-        asked = asked.same_draw();
-    }
-    if arguments.certifies {
-        asked = asked.certifies();
-    }
-    if let Some(budget) = arguments.budget {
-        asked = asked.budget(budget);
-    }
-    if wanted.fail_fast {
-        asked = asked.fail_fast();
-    }
-    asked
 }
 
 /// Who keeps hold of a device that a run starts, and where it is said at once what becomes of it.

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::sync::LazyLock;
 
 use super::{Command, Each, Found, elements, nodes_in_sequence};
-use crate::finding::{quote, show};
+use crate::finding::{number, quote, show};
 use regex::Regex;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_view::{
@@ -132,7 +132,7 @@ fn position_range(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<
         judged = true;
         let id = quote(node.node_id.or_empty());
         if let Some(theta) = position.theta.float().filter(|theta| theta.abs() > PI + ROUNDING) {
-            let text = format!("theta {theta} of node {id} is not between minus pi and pi");
+            let text = format!("theta {} of node {id} is not between minus pi and pi", number(theta));
             found.broken("ORD-MSG-09", text.clone());
             found.broken("MAP-02", text);
         }
@@ -144,20 +144,23 @@ fn position_range(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<
         {
             found.broken(
                 "ORD-MSG-09",
-                format!("allowedDeviationXY {allowed} of node {id} is below 0"),
+                format!("allowedDeviationXY {} of node {id} is below 0", number(allowed)),
             );
         }
         let turned = position.allowed_deviation_theta.float();
         let turned = turned.filter(|allowed| !(0.0..=PI + ROUNDING).contains(allowed));
         if let Some(allowed) = turned {
-            let text = format!("allowedDeviationTheta {allowed} of node {id} is not between 0 and pi");
+            let text = format!(
+                "allowedDeviationTheta {} of node {id} is not between 0 and pi",
+                number(allowed)
+            );
             found.broken("ORD-MSG-09", text);
         }
         for (name, coordinate) in [("x", &position.x), ("y", &position.y)] {
             if let Some(value) = coordinate.float().filter(|value| value.abs() > FAR) {
                 found.remark(
                     "MAP-02",
-                    format!("{name} {value} of node {id} is not likely to be in metres"),
+                    format!("{name} {} of node {id} is not likely to be in metres", number(value)),
                 );
             }
         }

@@ -5,7 +5,7 @@
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
-use crate::finding::{broken, quote, remark};
+use crate::finding::{broken, number, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_view::{MapState, Position, StateView};
 use tck_world::{Fact, Listen, Observation, Topic};
@@ -103,7 +103,7 @@ impl Running for PositionRange {
             return false;
         };
         if let Some(theta) = position.theta.float().filter(|theta| theta.abs() > PI + ROUNDING) {
-            let text = format!("theta {theta} is not between minus pi and pi");
+            let text = format!("theta {} is not between minus pi and pi", number(theta));
             findings.push(broken("MAP-02", record.seq(), text));
         }
         for (name, coordinate) in [("x", &position.x), ("y", &position.y)] {
@@ -111,7 +111,7 @@ impl Running for PositionRange {
                 findings.push(remark(
                     "MAP-02",
                     record.seq(),
-                    format!("{name} {value} can hardly be metres"),
+                    format!("{name} {} can hardly be metres", number(value)),
                 ));
             }
         }

@@ -36,6 +36,23 @@ impl Layout {
         Ok(types.into_iter().collect())
     }
 
+    /// How many nodes and edges a layout file has, whatever vehicle they are for.
+    ///
+    /// # Errors
+    /// When it is no layout.
+    pub fn written_in(source: &Arc<Source>) -> Result<(usize, usize), Vec<Diagnostic>> {
+        let file = File::read(source)?;
+        let nodes: BTreeSet<&str> = file
+            .layouts()
+            .flat_map(|layout| layout.nodes.iter().map(|node| node.node_id.as_str()))
+            .collect();
+        let edges: BTreeSet<&str> = file
+            .layouts()
+            .flat_map(|layout| layout.edges.iter().map(|edge| edge.edge_id.as_str()))
+            .collect();
+        Ok((nodes.len(), edges.len()))
+    }
+
     /// Reads what `vehicle_type` may drive on; the one type in the file unless said. Nodes and edges of other
     /// types and what an empty vehicle must not use are left out, which [`Layout::left_out`] tells. What demands an action is
     /// there, until [`Layout::fitted`] says whether the vehicle can do it.

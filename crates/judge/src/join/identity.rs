@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::RunPart;
 use tck_journal::event::ShardRecord;
-use tck_result::{Part, most_common};
+use tck_result::{Part, most_common, others};
 
 /// Settings that may differ from bench to bench: where things are, and which piece of a kind of device it is.
 const OF_A_BENCH: [&str; 6] = [
@@ -26,7 +26,7 @@ impl Part for RunPart {
     }
 
     fn name(&self) -> String {
-        format!("the run {}", self.result.run)
+        format!("the run {} in {}", self.result.run, self.evidence.bundle)
     }
 
     fn facts(&self) -> BTreeMap<String, String> {
@@ -60,9 +60,15 @@ impl Part for RunPart {
             return None;
         }
         let bounded = |text: &str| text.chars().take(80).collect::<String>();
+        let of_device: Vec<&Self> = alike
+            .iter()
+            .copied()
+            .filter(|part| part.result.device.serial_number == serial_number)
+            .collect();
         Some(format!(
-            "its device is `{}`, and that of the others `{}`, of which nothing says that they are of one kind",
+            "its device is `{}`, and that of {} `{}`, of which nothing says that they are of one kind",
             bounded(&own.serial_number),
+            others(&of_device),
             bounded(&serial_number)
         ))
     }

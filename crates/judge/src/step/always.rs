@@ -288,7 +288,7 @@ impl Holding {
                 }
                 _ => {
                     clause.holds = ClauseOutcome::Held;
-                    clause.message = format!("all {} {} messages match", self.seen, self.verb.topic);
+                    clause.message = all_match(self.seen, &self.verb.topic);
                 }
             }
         }
@@ -310,18 +310,18 @@ impl Holding {
         }
         match self.seen {
             n if n > 0 && self.check.is_some() && !self.judged => {
-                let why = format!("none of {n} {} messages shows what is to be judged", self.verb.topic);
+                let topic = &self.verb.topic;
+                let why = match n {
+                    1 => format!("the only {topic} message does not show what is to be judged"),
+                    _ => format!("none of {n} {topic} messages shows what is to be judged"),
+                };
                 (ClauseOutcome::Unobservable(why.clone()), why, None)
             }
             0 => {
                 let why = format!("no {} message came that could have been judged", self.verb.topic);
                 (ClauseOutcome::Unobservable(why.clone()), why, None)
             }
-            n => (
-                ClauseOutcome::Held,
-                format!("all {n} {} messages match", self.verb.topic),
-                None,
-            ),
+            n => (ClauseOutcome::Held, all_match(n, &self.verb.topic), None),
         }
     }
 }
@@ -351,12 +351,11 @@ impl Goal {
                 (ClauseOutcome::Unobservable(why.to_owned()), why.to_owned(), None)
             }
             (None, None) => {
-                let message = format!(
-                    "{} {} messages came within {}, and none matches",
-                    self.seen,
-                    self.until.topic,
-                    seconds(waited)
-                );
+                let (topic, waited) = (&self.until.topic, seconds(waited));
+                let message = match self.seen {
+                    1 => format!("1 {topic} message came within {waited}, and it does not match"),
+                    n => format!("{n} {topic} messages came within {waited}, and none matches"),
+                };
                 (ClauseOutcome::Violated, message, None)
             }
         };
@@ -379,5 +378,13 @@ impl Goal {
         }
         let reached = if witness.is_some() { Ok(()) } else { Err(message) };
         (clauses, reached, witness)
+    }
+}
+
+/// That so many messages of a topic match, in words.
+fn all_match(seen: u64, topic: &str) -> String {
+    match seen {
+        1 => format!("the only {topic} message matches"),
+        _ => format!("all {seen} {topic} messages match"),
     }
 }

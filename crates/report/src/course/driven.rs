@@ -248,6 +248,8 @@ impl Driven {
         let edges = route.map_or_else(Vec::new, |route| route.stretches(&map));
         let base: Vec<Path> = edges.iter().filter(|edge| edge.released).map(path).collect();
         let trail = self.trails.get(&map).map_or_else(Vec::new, Trail::places);
+        let known = self.trails.get(&map).into_iter().flat_map(Trail::known);
+        let until = known.take_while(|(.., (at, _))| *at <= first).count();
         let elsewhere = self.trails.iter().filter(|(on, _)| **on != map);
         Some(CoursePicture {
             order: route.map_or_else(String::new, |route| route.order.clone()),
@@ -255,6 +257,7 @@ impl Driven {
             message: route.map(|route| route.message),
             nodes: route.map_or_else(Vec::new, |route| route.stops(&map)),
             edges,
+            until: Some(until).filter(|until| *until < trail.len()),
             trail,
             by_nodes: !self.has_position,
             elsewhere: elsewhere.map(|(_, trail)| trail.known().count()).sum(),

@@ -11,6 +11,8 @@ use tck_course::picture::{Dot, Line, LineKind, Picture, Stand};
 const BESIDE: usize = 20;
 /// How many nodes a row of the table names.
 const NAMES: usize = 40;
+/// Nearer than this are findings at one place, in metres.
+const ONE_PLACE: f64 = 0.1;
 /// How many findings of one message the table tells.
 const TOLD: usize = 5;
 
@@ -67,10 +69,16 @@ impl CoursePicture {
                 name: format!("{}, {}", edge.id, if edge.released { "base" } else { "horizon" }),
             })
         });
-        let trail = (self.trail.len() > 1).then(|| Line {
-            kind: LineKind::Trail,
-            points: self.trail.clone(),
-            name: "where the vehicle drove".to_owned(),
+        let (before, after) = self.parted();
+        let driven = [
+            (LineKind::After, after, "where the vehicle drove after arrow 1"),
+            (LineKind::Trail, before, "where the vehicle drove"),
+        ];
+        let driven = driven.into_iter().filter(|(_, points, _)| points.len() > 1);
+        let driven = driven.map(|(kind, points, name)| Line {
+            kind,
+            points,
+            name: name.to_owned(),
         });
         let mut nodes: Vec<Dot> = Vec::new();
         for stop in &self.nodes {
@@ -89,21 +97,46 @@ impl CoursePicture {
         for node in &mut nodes {
             node.name = short(&node.name, BESIDE).into_owned();
         }
-        let vehicles = self.found.iter().enumerate().filter_map(|(at, found)| {
-            let (x, y) = found.place?;
-            Some(Stand {
-                x,
-                y,
-                theta: found.theta,
-                name: (at + 1).to_string(),
-            })
-        });
+        let mut vehicles: Vec<Stand> = Vec::new();
+        for (at, found) in self.found.iter().enumerate() {
+            let Some((x, y)) = found.place else { continue };
+            let number = at + 1;
+            // What was found at one place is one arrow with all numbers: that of the worst.
+            let same = vehicles
+                .iter_mut()
+                .find(|known| (known.x - x).hypot(known.y - y) < ONE_PLACE);
+            match same {
+                Some(known) => known.name.push_str(&format!(", {number}")),
+                None => vehicles.push(Stand {
+                    x,
+                    y,
+                    theta: found.theta,
+                    name: number.to_string(),
+                }),
+            }
+        }
+        // What comes later lies above, and the worst comes first.
+        vehicles.reverse();
         Picture {
-            lines: of_order.chain(trail).collect(),
+            lines: of_order.chain(driven).collect(),
             nodes,
             start: self.trail.first().copied(),
-            vehicles: vehicles.collect(),
+            vehicles,
         }
+    }
+
+    /// Where the vehicle drove until the worst finding, and after it; both parts have the place of the finding.
+    fn parted(&self) -> (Vec<(f64, f64)>, Vec<(f64, f64)>) {
+        let Some(until) = self.until.filter(|until| *until < self.trail.len()) else {
+            return (self.trail.clone(), Vec::new());
+        };
+        let (before, after) = self.trail.split_at(until);
+        let mut before = before.to_vec();
+        let here = self.found.first().and_then(|found| found.place);
+        before.extend(here.filter(|here| before.last() != Some(here)));
+        let last = before.last().copied();
+        let after = last.into_iter().chain(after.iter().copied()).collect();
+        (before, after)
     }
 
     fn description(&self) -> String {
@@ -175,20 +208,25 @@ impl CoursePicture {
 
     /// Where the vehicle drove, in words.
     fn way(&self) -> String {
-        let length: f64 = self
-            .trail
-            .windows(2)
-            .map(|pair| (pair[1].0 - pair[0].0).hypot(pair[1].1 - pair[0].1))
-            .sum();
+        let length = |way: &[(f64, f64)]| -> f64 {
+            let steps = way.windows(2);
+            steps
+                .map(|pair| (pair[1].0 - pair[0].0).hypot(pair[1].1 - pair[0].1))
+                .sum()
+        };
         let mut text = match (self.trail.first(), self.trail.last()) {
             (Some(first), Some(last)) => format!(
                 "{} m, from {} to {}",
-                metres(length),
+                metres(length(&self.trail)),
                 place(Some(*first)),
                 place(Some(*last))
             ),
             _ => "nobody knows where".to_owned(),
         };
+        let (_, after) = self.parted();
+        if after.len() > 1 {
+            text.push_str(&format!("; {} m of it after arrow 1", metres(length(&after))));
+        }
         if self.by_nodes {
             text.push_str("; the vehicle does not say where it is, its last nodes are drawn");
         }

@@ -25,6 +25,9 @@ pub struct CoursePicture {
     pub edges: Vec<Stretch>,
     /// Where the vehicle was on this map, the oldest place first.
     pub trail: Vec<(f64, f64)>,
+    /// How many places of it come before the worst finding, or are that of it; absent where nothing comes after it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub until: Option<usize>,
     /// Whether the vehicle never says where it is, and is drawn at its last nodes.
     pub by_nodes: bool,
     /// At how many places it was on other maps.

@@ -96,6 +96,7 @@ fn a_vehicle_that_leaves_its_way_as_a_picture() {
         ("base", 1),
         ("horizon", 2),
         ("trail", 1),
+        ("after", 1),
         ("node", 4),
         ("start", 1),
         ("ring", 2),
@@ -113,6 +114,28 @@ fn a_vehicle_that_leaves_its_way_as_a_picture() {
     ] {
         assert!(table.contains(words), "{words} in {table}");
     }
+}
+
+#[test]
+fn the_worst_finding_lies_on_top_and_those_at_its_place_are_named_with_it() {
+    let mut picture = strayed();
+    assert_eq!((picture.until, picture.trail.len()), (Some(5), 6));
+    let mut same = picture.found[0].clone();
+    same.number = 9;
+    picture.found.push(same);
+    let figure = picture.figure("c", "t", |_| false).expect("a figure");
+    let numbers: Vec<&str> = figure
+        .split("class=\"number\"")
+        .skip(1)
+        .filter_map(|rest| rest.split_once('>')?.1.split_once('<'))
+        .map(|(number, _)| number)
+        .collect();
+    assert_eq!(numbers, ["2", "1, 3"]);
+    assert!(figure.contains("m of it after arrow 1"), "{figure}");
+    assert!(figure.find("class=\"after\"") < figure.find("class=\"trail\""));
+    picture.until = None;
+    let whole = picture.figure("c", "t", |_| false).expect("a figure");
+    assert!(!whole.contains("class=\"after\"") && !whole.contains("m of it after arrow 1"));
 }
 
 #[test]

@@ -5,7 +5,7 @@ use askama::Template;
 use super::Anchors;
 use super::view::Badge;
 use crate::clean;
-use crate::statement::{seconds, test_verdict};
+use crate::statement::{many, seconds, test_verdict};
 use tck_base::verdict::Verdict;
 use tck_journal::Journal;
 use tck_result::{RunResult, TestResult};
@@ -71,7 +71,7 @@ pub fn strip(result: &RunResult, anchors: &Anchors, journal: Option<&Journal>) -
         (place(time), seconds(time))
     });
     Strip {
-        description: format!("{} tests in {}", fields.len(), seconds(last)),
+        description: format!("{} in {}", many(fields.len(), "test"), seconds(last)),
         fields,
         marks: marks.collect(),
     }

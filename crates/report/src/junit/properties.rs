@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 use askama::filters::Escaper as _;
 
 use super::xml::{attribute, with_tags};
-use crate::cases::Case;
+use crate::cases::{Case, Elsewhere};
 use crate::html::Escape;
 use crate::keys::{Key, Keys};
 use tck_base::verdict::Verdict;
@@ -106,7 +106,7 @@ fn worst_of_each<'k>(all: &[Case<'_>], keys: &'k Keys) -> BTreeMap<&'k str, usiz
             continue;
         };
         let best = worst.entry(key).or_insert(at);
-        if case.verdict > all[*best].verdict {
+        if case.counted() > all[*best].counted() {
             *best = at;
         }
     }
@@ -135,6 +135,7 @@ fn of_case(case: &Case<'_>, own: Option<&Key>, keys: &Keys) -> String {
         ("test_id", testrail),
         ("testrail_result_comment", comment.filter(|_| testrail.is_some())),
         ("vda5050.verdict", Some(case.word())),
+        ("vda5050.counted-in", case.elsewhere.map(Elsewhere::word)),
         ("vda5050.title", Some(case.title).filter(|title| !title.is_empty())),
         ("vda5050.requirements", about.as_deref()),
     ])

@@ -58,9 +58,22 @@ fn a_simulated_device_takes_all_and_a_run_only_what_is_permitted() {
     one.shape(&mut vehicle);
     assert_eq!(vehicle.config.switched_on, ["online-twice"]);
     assert!(
-        one.limit().starts_with("The mock vehicles behaved like A product"),
+        one.limit()
+            .starts_with("The mock vehicles behaved like a product (counterpart some-product) in what"),
         "{}",
         one.limit()
+    );
+}
+
+#[test]
+fn what_a_run_takes_nothing_of_is_said_to_have_no_effect() {
+    let habits = "  - does: It writes CONNECTIONBROKEN with QoS 0.\n    as: will-qos-0\n    where: will.ts\n";
+    let all = read("agv", habits).unwrap();
+    let limit = all.find("some-product", Role::Agv).unwrap().limit();
+    assert_eq!(
+        limit,
+        "`--like some-product` had no effect: a product (counterpart some-product) has no habit that a run may take, and the mock \
+         vehicles behaved as always."
     );
 }
 
