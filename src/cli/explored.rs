@@ -67,7 +67,8 @@ fn cases(result: &ExploredResult) -> Vec<Plain> {
     let case = |name: &str, verdict: Verdict, text: String| Plain {
         suite: suite.clone(),
         name: name.to_owned(),
-        verdict: Some(verdict),
+        verdict,
+        elsewhere: None,
         text,
     };
     let held = match result.conversations > result.undecided {

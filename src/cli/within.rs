@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::args::{Cli, Command, OutputArgs, RenderedTo, Simulated};
+use super::args::{Cli, Command, HistoryTo, OutputArgs, RenderedTo, Simulated};
 use super::problem::Problem;
 use super::qualified;
 use tck_audit::saved;
@@ -116,10 +116,8 @@ fn named(command: &Command) -> Vec<Output<'_>> {
         .concat(),
         Command::Watch(watch) => one("--record", watch.record.as_deref()),
         Command::Campaign(campaign) => one("--out", campaign.out.as_deref()),
-        Command::History(history) => {
-            let files = history.renderings.iter().filter_map(|wanted| wanted.file.as_deref());
-            files.map(|file| ("--as", file)).collect()
-        }
+        Command::History(history) => drawn(&history.renderings),
+        Command::Migrate(migrate) => drawn(&migrate.renderings),
         Command::Qualify(qualify) => one("--out", qualify.out.as_deref()),
         Command::Init(init) => match &init.suites {
             Some(folder) => vec![("--suites", folder.as_path())],
@@ -148,6 +146,11 @@ fn of_a_run(output: &OutputArgs) -> Vec<Output<'_>> {
 }
 
 fn rendered(all: &[RenderedTo]) -> Vec<Output<'_>> {
+    let files = all.iter().filter_map(|wanted| wanted.file.as_deref());
+    files.map(|file| ("--as", file)).collect()
+}
+
+fn drawn(all: &[HistoryTo]) -> Vec<Output<'_>> {
     let files = all.iter().filter_map(|wanted| wanted.file.as_deref());
     files.map(|file| ("--as", file)).collect()
 }
@@ -195,6 +198,7 @@ mod tests {
             "watch --broker mqtt://127.0.0.1:1 --record @/x.jsonl",
             "campaign x.toml --out @/results",
             "history somewhere --as html=@/x.html",
+            "migrate x.jsonl --to 3.0 --as html=@/x.html",
             "qualify --out @/proof",
             "init --file @/device.toml",
             "init --suites @/suites",
