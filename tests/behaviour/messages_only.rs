@@ -1,4 +1,4 @@
-//! A version of which only messages can be judged yet: it is known everywhere, and devices are not judged by it.
+//! A version of which messages and one side can be judged: it is known everywhere, and the other side is refused.
 
 use std::fs;
 
@@ -150,27 +150,53 @@ fn a_recording_is_judged_message_by_message() {
 }
 
 #[test]
-fn devices_are_not_judged_by_it_and_a_sentence_says_so() {
+fn a_side_that_is_not_judged_by_it_yet_is_refused_with_a_sentence() {
     let bench = Bench::new();
-    let sentence = "of protocol version 3.0.0 only messages can be judged";
+    let sentence = "of protocol version 3.0.0 no master-control can be judged";
     for command in [
-        &["run", "--virtual"][..],
-        &["run", "--virtual", "--role", "master-control"],
-        &["run", "--virtual", "--plan"],
-        &["explore", "--virtual"],
-        &["qualify"],
-        &["simulate", "agv"],
+        &["run", "--virtual", "--role", "master-control"][..],
+        &["run", "--virtual", "--plan", "--role", "master-control"],
+        &["qualify", "--role", "master-control"],
+        &["simulate", "master-control"],
     ] {
         let words: Vec<&str> = command.iter().copied().chain(["--protocol", VERSION]).collect();
         run_in(bench.path(), &words).code(2).says(sentence).says("2.1.0");
     }
-    run(&["list", "tests", "--protocol", VERSION]).code(4).says(sentence);
-    let profile = "[device]\nrole = \"agv\"\nmanufacturer = \"A\"\nserial-number = \"1\"\nprotocol = \"3.0.0\"\n";
+    run(&["list", "tests", "--role", "master-control", "--protocol", VERSION])
+        .code(4)
+        .says(sentence);
+    run_in(bench.path(), &["explore", "--virtual", "--protocol", VERSION])
+        .code(2)
+        .says("no stimuli");
+    let profile =
+        "[device]\nrole = \"master-control\"\nmanufacturer = \"A\"\nserial-number = \"1\"\nprotocol = \"3.0.0\"\n";
     fs::write(bench.path().join("device.toml"), profile).unwrap();
     run_in(bench.path(), &["run", "--profile", "device.toml"])
         .code(2)
         .says(sentence)
         .says("device.toml");
+}
+
+#[test]
+fn the_reference_robot_passes_what_its_tests_decide() {
+    let bench = Bench::new();
+    let ended = run_in(bench.path(), &["run", "--virtual", "--protocol", VERSION]);
+    let ended = ended.code(0);
+    assert!(
+        ended.stdout.contains("pass") || ended.stderr.contains("pass"),
+        "{}",
+        ended.stdout
+    );
+    let faulty = [
+        "run",
+        "--virtual",
+        "--protocol",
+        VERSION,
+        "--fault",
+        "cancels-whatever-order",
+        "cancel-order/another-by-name",
+    ];
+    run_in(bench.path(), &faulty).code(1);
 }
 
 #[test]
