@@ -561,6 +561,8 @@ fn incoming_messages_stay_values() {
                     "audit/time_stretch.rs",
                     "qualify/decider.rs",
                     "qualify/saved.rs",
+                    // What a version calls members is a part of its pack.
+                    "view/names/details.rs",
                 ]
                     .contains(&in_room(&path).as_str())
             {

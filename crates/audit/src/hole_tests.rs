@@ -313,7 +313,7 @@ fn a_factsheet_behind_one_that_was_lost_counts_for_the_command_after_it() {
         heard
             .online()
             .says("factsheet", factsheet())
-            .states(3)
+            .states(10)
             .loses("factsheet");
         heard.pace = Duration::from_millis(1);
         heard.says("factsheet", sheet).commands("polishFloor", json!([]));

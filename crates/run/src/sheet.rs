@@ -33,10 +33,11 @@ impl Sheet {
         let (group, member) = path.split_once('.').unwrap_or((path, ""));
         let own = self.names.spelled_names(Object::ProtocolLimits, &[group, member]);
         let own = own.unwrap_or_default().into_iter();
+        let limits = self.limits.as_ref()?;
         let value = own
             .clone()
             .next()
-            .and(own.fold(self.limits.as_ref(), |here, name| here?.get(name)));
+            .and(own.fold(Some(limits), |here, name| here?.get(name)));
         Some(value.and_then(Value::as_f64).is_some_and(|limit| limit > 0.0))
     }
 

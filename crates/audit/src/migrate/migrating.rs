@@ -164,6 +164,9 @@ impl<'r> Migrating<'r> {
         if self.is_copy(&message) || !self.is_own(&address.name) {
             return;
         }
+        if self.vehicles.len() < MOST {
+            self.vehicles.insert((address.manufacturer, address.serial_number));
+        }
         let Ok(value) = serde_json::from_slice::<Value>(&message.payload) else {
             self.left_out += 1;
             return;
@@ -172,9 +175,6 @@ impl<'r> Migrating<'r> {
             self.left_out += 1;
             return;
         };
-        if self.vehicles.len() < MOST {
-            self.vehicles.insert((address.manufacturer, address.serial_number));
-        }
         self.messages += 1;
         self.count_errors(&address.name, &value, &from);
         let after = self.spelled(&address.name, value, &from);
@@ -310,6 +310,14 @@ impl<'r> Migrating<'r> {
     /// Nothing was seen of it, it speaks the later version, or there are several.
     pub fn finish(self, recordings: Vec<Recording>) -> Result<Migration, MigrateError> {
         let (role, to) = (self.role, self.to);
+        let named = |(manufacturer, number): &(String, String)| format!("{manufacturer}/{number}");
+        if role == Role::Agv && self.vehicles.len() > 1 {
+            let some: Vec<String> = self.vehicles.iter().take(NAMED).map(named).collect();
+            return Err(MigrateError::Several {
+                count: self.vehicles.len(),
+                some: some.join(", "),
+            });
+        }
         let Some((from, tally)) = self.spoken else {
             return Err(match self.later {
                 Some(spoken) => MigrateError::NotEarlier {
@@ -319,14 +327,6 @@ impl<'r> Migrating<'r> {
                 None => MigrateError::Nothing(role),
             });
         };
-        let named = |(manufacturer, number): &(String, String)| format!("{manufacturer}/{number}");
-        if role == Role::Agv && self.vehicles.len() > 1 {
-            let some: Vec<String> = self.vehicles.iter().take(NAMED).map(named).collect();
-            return Err(MigrateError::Several {
-                count: self.vehicles.len(),
-                some: some.join(", "),
-            });
-        }
         let device = match (role, self.vehicles.first()) {
             (Role::Agv, Some(vehicle)) => named(vehicle),
             _ => "the master control".to_owned(),

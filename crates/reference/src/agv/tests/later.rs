@@ -18,6 +18,7 @@ fn robot(faults: &[&str]) -> Bench {
     config.names = serde_json::from_value::<Names>(json!({
         "state": { "agvPosition": "place", "instantActionStates": true },
         "position": { "positionInitialized": "sure" },
+        "action": { "retriable": true },
         "edge": { "startNodeId": false, "endNodeId": false, "maxSpeed": "fastest" },
     }))
     .unwrap();
