@@ -145,7 +145,7 @@ fn a_run_with_a_driving_test_that_fails_draws_it_and_draws_it_again_from_its_bun
         .split_once("<svg xmlns")
         .and_then(|(_, rest)| rest.split_once("</svg>"));
     let (svg, _) = svg.expect("a picture");
-    for class in ["base", "horizon", "trail", "vehicle"] {
+    for class in ["base", "horizon", "after", "vehicle"] {
         assert!(svg.contains(&format!("class=\"{class}\"")), "{class}: {svg}");
     }
     let read = vda5050_tck::journal::file::read(&folder.path().join("journal.jsonl"));
