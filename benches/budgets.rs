@@ -61,12 +61,15 @@ fn at_least(what: &'static str, value: f64, unit: &'static str, limit: f64) -> M
     }
 }
 
+/// What measures one thing.
+type Measure = fn() -> Vec<Measured>;
+
 fn main() {
     // `cargo test --benches` only wants to know that it compiles.
     if !std::env::args().any(|argument| argument == "--bench") {
         return;
     }
-    let measures: [(&str, fn() -> Vec<Measured>); 6] = [
+    let measures: [(&str, Measure); 6] = [
         ("start-up", start_up),
         ("virtual-suite", virtual_suite),
         ("exploration", exploration),

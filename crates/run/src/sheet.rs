@@ -32,12 +32,12 @@ impl Sheet {
     pub fn has_limit(&self, path: &str) -> Option<bool> {
         let (group, member) = path.split_once('.').unwrap_or((path, ""));
         let own = self.names.spelled_names(Object::ProtocolLimits, &[group, member]);
-        let own = own.unwrap_or_default().into_iter();
+        let mut own = own.unwrap_or_default().into_iter();
         let limits = self.limits.as_ref()?;
         let value = own
             .clone()
             .next()
-            .and(own.fold(Some(limits), |here, name| here?.get(name)));
+            .and(own.try_fold(limits, |here, name| here.get(name)));
         Some(value.and_then(Value::as_f64).is_some_and(|limit| limit > 0.0))
     }
 

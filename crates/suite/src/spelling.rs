@@ -39,6 +39,16 @@ struct Speller<'n> {
     names: &'n Names,
 }
 
+/// Whether a value is written with the usual words.
+fn is_term_the_same(term: &Term, place: Place<'_>) -> bool {
+    match &term.kind {
+        TermKind::Literal(Value::String(text)) => place.spelling.is_none_or(|own| own.word(text) == text),
+        TermKind::List(items) => items.iter().all(|item| is_term_the_same(item, place)),
+        TermKind::Map(_) => false,
+        _ => true,
+    }
+}
+
 impl<'n> Speller<'n> {
     /// The place of a member.
     fn below(&self, name: &str, place: Place<'n>) -> Place<'n> {
@@ -61,17 +71,8 @@ impl<'n> Speller<'n> {
             PatternKind::List(parts) | PatternKind::All(parts) => all(parts),
             PatternKind::Elements(elements) => self.is_the_same(&elements.pattern, place),
             PatternKind::Not(inner) => self.is_the_same(inner, place),
-            PatternKind::Equals(term) | PatternKind::Includes(term) => self.is_term_the_same(term, place),
-            PatternKind::In(terms) => terms.iter().all(|term| self.is_term_the_same(term, place)),
-            _ => true,
-        }
-    }
-
-    fn is_term_the_same(&self, term: &Term, place: Place<'n>) -> bool {
-        match &term.kind {
-            TermKind::Literal(Value::String(text)) => place.spelling.is_none_or(|own| own.word(text) == text),
-            TermKind::List(items) => items.iter().all(|item| self.is_term_the_same(item, place)),
-            TermKind::Map(_) => false,
+            PatternKind::Equals(term) | PatternKind::Includes(term) => is_term_the_same(term, place),
+            PatternKind::In(terms) => terms.iter().all(|term| is_term_the_same(term, place)),
             _ => true,
         }
     }

@@ -28,7 +28,7 @@ struct Part<'a> {
 }
 
 struct Row<'a> {
-    row: &'a RequirementRow,
+    requirement: &'a RequirementRow,
     class: &'static str,
     standing: String,
     decided: String,
@@ -78,7 +78,7 @@ fn row(row: &RequirementRow) -> Row<'_> {
     let broken = row.then.filter(|_| row.is_broken());
     let decided = row.after.as_ref().map(|_| words::decided_by(row));
     Row {
-        row,
+        requirement: row,
         class: broken.map_or("", Verdict::word),
         standing: words::standing(row).unwrap_or_default(),
         decided: decided.unwrap_or_default(),

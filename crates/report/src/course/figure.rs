@@ -7,6 +7,9 @@ use crate::clean::short;
 use crate::statement::many;
 use tck_course::picture::{Dot, Line, LineKind, Picture, Stand};
 
+/// Places one after the other, in metres.
+type Way = Vec<(f64, f64)>;
+
 /// How long a name beside a node may be, in characters.
 const BESIDE: usize = 20;
 /// How many nodes a row of the table names.
@@ -126,7 +129,7 @@ impl CoursePicture {
     }
 
     /// Where the vehicle drove until the worst finding, and after it; both parts have the place of the finding.
-    fn parted(&self) -> (Vec<(f64, f64)>, Vec<(f64, f64)>) {
+    fn parted(&self) -> (Way, Way) {
         let Some(until) = self.until.filter(|until| *until < self.trail.len()) else {
             return (self.trail.clone(), Vec::new());
         };

@@ -55,7 +55,7 @@ impl Agv {
 
     /// The states of these actions.
     fn listed(&self, which: impl Fn(&Action) -> bool) -> Value {
-        let actions = self.actions.iter().filter(|action| which(*action));
+        let actions = self.actions.iter().filter(|action| which(action));
         actions.filter_map(|action| self.action_state(action)).collect()
     }
 

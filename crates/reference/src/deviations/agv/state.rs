@@ -171,13 +171,11 @@ records! {
         => state(|_, m| text(m, "operatingMode", |mode| mode.replace("SEMIAUTOMATIC", "SEMI_AUTOMATIC")));
     fault "mode-off-by-one" ["MODE-01", "STATE-07"] "Takes every operating mode but AUTOMATIC for the next one on the list."
         => state(|agv, m| m.set("operatingMode", match agv.mode {
-            Mode::Automatic => "AUTOMATIC",
-            Mode::Semiautomatic => "MANUAL",
+            Mode::Automatic | Mode::Startup => "AUTOMATIC",
+            Mode::Semiautomatic | Mode::Intervened => "MANUAL",
             Mode::Manual => "SERVICE",
             Mode::Service => "TEACHIN",
             Mode::Teachin => "SEMIAUTOMATIC",
-            Mode::Startup => "AUTOMATIC",
-            Mode::Intervened => "MANUAL",
         }));
 
     fault "safety-state-missing" ["STATE-MSG-01", "STATE-01"] "Leaves safetyState out of its states."
