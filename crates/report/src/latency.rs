@@ -22,8 +22,8 @@ pub struct Row {
 #[must_use]
 pub fn rows(latency: OwnLatency) -> Vec<Row> {
     let all = [
-        ("read by the tap, until handed on", latency.passed_on),
-        ("read by the harness, until recorded and judged", latency.judged),
+        ("handed on", latency.passed_on),
+        ("judged", latency.judged),
     ];
     let row = |(what, spread): (&'static str, Option<Spread>)| {
         let spread = spread?;
