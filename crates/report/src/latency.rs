@@ -21,10 +21,7 @@ pub struct Row {
 /// What was measured, each as a row.
 #[must_use]
 pub fn rows(latency: OwnLatency) -> Vec<Row> {
-    let all = [
-        ("handed on", latency.passed_on),
-        ("judged", latency.judged),
-    ];
+    let all = [("handed on", latency.passed_on), ("judged", latency.judged)];
     let row = |(what, spread): (&'static str, Option<Spread>)| {
         let spread = spread?;
         Some(Row {
