@@ -65,7 +65,7 @@ fn a_journal_that_breaks_off_anywhere_gives_a_partial_result_that_accuses_nobody
     let entries = live.recorder.journal().entries();
     let mut at = 1;
     while at < entries.len() {
-        let result = judge(&library.rules, &entries[..at]).expect("judged");
+        let result = judge(&library.rules, entries.iter().take(at)).expect("judged");
         assert!(result.partial, "cut at {at}");
         let failed: Vec<_> = result
             .tests
@@ -166,7 +166,7 @@ fn a_harness_that_was_slower_than_its_shortest_time_limit_says_so_and_judges_not
             p99_micros: 90,
             worst_micros,
         };
-        let mut entries = live.recorder.journal().entries().to_vec();
+        let mut entries: Vec<_> = live.recorder.journal().entries().iter().collect();
         let mut last = entries.pop().expect("a record").record.clone();
         let Event::RunEnded { latency, .. } = &mut last.event else {
             panic!("{last:?}");

@@ -6,15 +6,10 @@ use std::path::Path;
 use super::args::Format;
 use super::exit::Exit;
 use super::problem::Problem;
-use tck_base::diagnostic::Diagnostic;
+use super::result_bundle;
 use tck_base::verdict::Verdict;
 use tck_explore::saved::{ExploredResult, FoundResult, RESULT_FORMAT};
-use tck_report::junit::{self, Plain};
-use tck_report::manifest::Manifest;
-use tck_run::write_whole;
-
-/// Name of the result inside its bundle.
-const NAME: &str = "result.json";
+use tck_report::junit::Plain;
 
 /// Whether a bundle is that of a part of an exploration, or of parts that were joined.
 pub(super) fn is_exploration(folder: &Path) -> bool {
@@ -23,26 +18,18 @@ pub(super) fn is_exploration(folder: &Path) -> bool {
 
 /// Reads the result of a bundle.
 pub(super) fn read(folder: &Path) -> Result<ExploredResult, Problem> {
-    let path = folder.join(NAME);
-    let wrong = |why: String| Problem::from(Diagnostic::whole("result", format!("{}: {why}", path.display())));
-    let text = std::fs::read(&path).map_err(|error| wrong(error.to_string()))?;
-    serde_json::from_slice(&text).map_err(|error| wrong(error.to_string()))
+    result_bundle::read(folder)
 }
 
 /// Writes a bundle, and gives its root hash. What was joined has the shortest conversations as tests.
 pub(super) fn write(result: &ExploredResult, folder: &Path) -> Result<String, Problem> {
-    let broken = |error: &dyn std::fmt::Display| Problem::Environment(error.to_string());
-    let text = serde_json::to_string_pretty(result).map_err(|error| broken(&error))? + "\n";
-    let xml = junit::plain(&cases(result)).map_err(|error| broken(&error))?;
-    let mut files = vec![(NAME.to_owned(), text), ("junit.xml".to_owned(), xml)];
-    if result.merged.is_some() {
+    let shortest = if result.merged.is_some() {
         let all = result.findings.iter().chain(&result.remarks);
-        files.extend(all.map(|one| (file_of(one), one.test.clone())));
-    }
-    for (name, text) in files {
-        write_whole(&folder.join(name), text.as_bytes()).map_err(|error| broken(&error))?;
-    }
-    Ok(Manifest::write(folder).map_err(|error| broken(&error))?.root)
+        all.map(|one| (file_of(one), one.test.clone())).collect()
+    } else {
+        Vec::new()
+    };
+    result_bundle::write(result, &cases(result), shortest, folder)
 }
 
 /// Where a joined bundle has the conversation of a finding. A result may have been written by anybody.

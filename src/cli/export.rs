@@ -11,7 +11,6 @@ use super::problem::Problem;
 use tck_base::diagnostic::Diagnostic;
 use tck_journal::Event;
 use tck_journal::file::{self, Recording};
-use tck_judge as judge;
 use tck_judge::Library;
 use tck_report::attestation::Attestation;
 use tck_report::certificate::{self, CertificateError};
@@ -166,9 +165,7 @@ fn intact(folder: &Path, library: &Library) -> Result<(RunResult, String), Probl
     let journal_path = file::find(folder);
     let Recording { journal, .. } =
         file::read(&journal_path).map_err(|error| Problem::from(Diagnostic::whole("journal", error.to_string())))?;
-    let mut result = judge::judge(&library.rules, journal.entries())
-        .map_err(|error| Problem::from(Diagnostic::whole("journal", format!("{}: {error}", folder.display()))))?;
-    result.journal = file::name_of(&journal_path);
+    let result = super::rejudged::judged(library, &journal, (folder, &journal_path))?;
     let path = folder.join("result.json");
     let saved =
         result_file::read(&path).map_err(|error| Problem::from(Diagnostic::whole("result", error.to_string())))?;

@@ -20,9 +20,9 @@ use tck_page::{
     Choice, Desk, Finding, Floor, FloorEdge, FloorNode, Page, PageError, PageServer, Planned, Prompt, RoutePart,
     StepFacts, TestFacts, VehicleOnFloor, Way,
 };
-use tck_profile::Effective;
+use tck_profile::{Effective, Profile};
 use tck_result::{RunResult, TestResult};
-use tck_run::{Answer, Place, Progress};
+use tck_run::{Answer, Place, Progress, Request};
 use tck_suite::model::{Step, Test};
 use tck_view::{MessageView, StateView, Topic};
 
@@ -264,6 +264,13 @@ pub(super) fn asks(catalogue: &Catalogue, pack: &Pack) -> BTreeMap<String, Strin
     let all = catalogue.all();
     all.map(|one| (one.id.as_str().to_owned(), one.edition(pack).text.clone()))
         .collect()
+}
+
+/// How often a person is asked in each test that is selected.
+pub(super) fn prompts(request: &Request, profile: &Profile) -> BTreeMap<String, u64> {
+    let of = |test: &Test| tck_run::prompts(test, &profile.hooks) as u64 * u64::from(request.repeat);
+    let all = request.tests.iter().map(|test| (test.id.clone(), of(test)));
+    all.filter(|(_, prompts)| *prompts > 0).collect()
 }
 
 /// A layout as the page draws it.

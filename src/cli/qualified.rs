@@ -4,19 +4,14 @@ use std::path::Path;
 
 use super::exit::Exit;
 use super::problem::Problem;
-use tck_base::diagnostic::Diagnostic;
+use super::result_bundle;
 use tck_base::verdict::Verdict;
 use tck_judge::Library;
 use tck_qualify::prove;
 use tck_qualify::saved::{QualificationResult, QualifiedSide, RESULT_FORMAT};
 use tck_reference::Fault;
-use tck_report::junit::{self, Plain};
-use tck_report::manifest::Manifest;
-use tck_run::write_whole;
+use tck_report::junit::Plain;
 use tck_simulate::BuiltIn;
-
-/// Name of the result inside its bundle.
-pub(super) const NAME: &str = "result.json";
 
 /// Whether a bundle is that of a qualification.
 pub(super) fn is_qualification(folder: &Path) -> bool {
@@ -25,21 +20,12 @@ pub(super) fn is_qualification(folder: &Path) -> bool {
 
 /// Reads the result of a bundle.
 pub(super) fn read(folder: &Path) -> Result<QualificationResult, Problem> {
-    let path = folder.join(NAME);
-    let wrong = |why: String| Problem::from(Diagnostic::whole("result", format!("{}: {why}", path.display())));
-    let text = std::fs::read(&path).map_err(|error| wrong(error.to_string()))?;
-    serde_json::from_slice(&text).map_err(|error| wrong(error.to_string()))
+    result_bundle::read(folder)
 }
 
 /// Writes a bundle, and gives its root hash.
 pub(super) fn write(result: &QualificationResult, folder: &Path) -> Result<String, Problem> {
-    let broken = |error: &dyn std::fmt::Display| Problem::Environment(error.to_string());
-    let text = serde_json::to_string_pretty(result).map_err(|error| broken(&error))? + "\n";
-    let xml = junit::plain(&cases(result)).map_err(|error| broken(&error))?;
-    for (name, text) in [(NAME, text), ("junit.xml", xml)] {
-        write_whole(&folder.join(name), text.as_bytes()).map_err(|error| broken(&error))?;
-    }
-    Ok(Manifest::write(folder).map_err(|error| broken(&error))?.root)
+    result_bundle::write(result, &cases(result), Vec::new(), folder)
 }
 
 /// A case for each fault, and for everything that is wrong.

@@ -10,10 +10,10 @@ use super::exit::Exit;
 use super::merge;
 use super::outputs::Outputs;
 use super::problem::Problem;
+use super::rejudged::judged;
 use tck_audit::saved;
 use tck_base::diagnostic::Diagnostic;
 use tck_journal::file::{self, Recording};
-use tck_judge as judge;
 use tck_report::{clean, compare, headline, json as result_file, manifest, overview, side_by_side};
 use tck_result::RunResult;
 use tck_run::{Bundle, sources, write_all};
@@ -66,9 +66,7 @@ pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem
     if torn {
         eprintln!("the last line of the journal is cut off, as after a crash; everything before it is used");
     }
-    let mut result = judge::judge(&library.rules, journal.entries())
-        .map_err(|error| Problem::from(Diagnostic::whole("journal", format!("{}: {error}", folder.display()))))?;
-    result.journal = file::name_of(&path);
+    let result = judged(&library, &journal, (folder, &path))?;
     if arguments.rejudge {
         return rejudge(folder, &result, arguments.format);
     }
@@ -115,8 +113,8 @@ fn journal_of(path: &Path) -> Result<Recording, Problem> {
 /// Prints one record: what it is, when and where it was seen, and the message as it was sent.
 fn message(folder: &Path, number: u64, format: Format) -> Result<Exit, Problem> {
     let Recording { journal, .. } = journal_of(&file::find(folder))?;
-    let Some(entry) = journal.entries().iter().find(|entry| entry.seq() == number) else {
-        let last = journal.entries().last().map_or(0, |entry| entry.seq());
+    let Some(entry) = journal.get(number) else {
+        let last = journal.last_seq();
         let title = format!("the journal has no record #{number}; its last one is #{last}");
         return Err(Diagnostic::whole("message", title).into());
     };

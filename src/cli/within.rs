@@ -79,10 +79,9 @@ impl Bundles {
     /// The bundle that a file or folder would lie in, or be.
     pub(super) fn around(&self, path: &Path) -> Option<PathBuf> {
         let absolute = std::path::absolute(path).ok()?;
-        let there = |path: &Path| path.ancestors().find_map(|one| one.canonicalize().ok());
         // Some files are written where a link leads, others where it lies.
-        let leads = there(&absolute);
-        let lies = absolute.parent().and_then(there);
+        let leads = place(&absolute, LINKS);
+        let lies = absolute.parent().and_then(|folder| place(folder, LINKS));
         let mut folders = leads.iter().chain(&lies).flat_map(|path| path.ancestors());
         let is_one = |folder: &Path| {
             let is_made = self.made.as_deref() == Some(folder);
@@ -90,6 +89,29 @@ impl Bundles {
         };
         folders.find(|folder| is_one(folder)).map(Path::to_owned)
     }
+}
+
+/// So many links that lead to nothing yet are followed, one after the other, as the operating system does.
+const LINKS: usize = 40;
+
+/// What is there of the place where a path leads, even if it does so over a link to something that is not there yet.
+fn place(path: &Path, links: usize) -> Option<PathBuf> {
+    for one in path.ancestors() {
+        if let Ok(there) = one.canonicalize() {
+            return Some(there);
+        }
+        let (Ok(target), Some(folder)) = (one.read_link(), one.parent()) else {
+            continue;
+        };
+        let rest = path.strip_prefix(one).ok()?;
+        let mut on = folder.join(target);
+        // Nothing joined would still end the path in a separator, behind which no link is read.
+        if !rest.as_os_str().is_empty() {
+            on.push(rest);
+        }
+        return place(&on, links.checked_sub(1)?);
+    }
+    None
 }
 
 fn is_bundle(folder: &Path) -> bool {
@@ -211,6 +233,39 @@ mod tests {
             assert!(!refuses(text, "new"), "{text}: a folder that is not there yet");
         }
         assert!(!refuses("run --virtual --events -", "run"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_into_a_bundle_is_no_way_around_though_it_leads_to_nothing_yet() {
+        use std::os::unix::fs::symlink;
+        let root = folder();
+        let at = |name: &str| root.path().join(name);
+        std::fs::create_dir(at("links")).expect("a folder");
+        for (link, to) in [
+            ("links/file", at("run/new.xml")),
+            ("links/relative", PathBuf::from("../run/new.xml")),
+            ("links/folder", at("run/new")),
+            ("links/second", PathBuf::from("relative")),
+            ("links/round", PathBuf::from("round")),
+            ("links/harmless", at("page/new.xml")),
+        ] {
+            symlink(to, at(link)).expect("a link");
+        }
+        let around = |name: &str| Bundles::default().around(&at(name));
+        let bundle = at("run").canonicalize().ok();
+        for link in [
+            "links/file",
+            "links/relative",
+            "links/folder",
+            "links/folder/deep/x.xml",
+            "links/second",
+        ] {
+            assert_eq!(around(link), bundle, "{link}");
+        }
+        for link in ["links/round", "links/harmless", "links/new"] {
+            assert_eq!(around(link), None, "{link}");
+        }
     }
 
     #[test]

@@ -155,6 +155,27 @@ impl Cluster {
         })
     }
 
+    /// Two brokers `mosquitto` with a bridge that passes everything on: what others need a cluster for, for any number of topics.
+    pub fn mosquitto() -> Option<Self> {
+        Self::start(|folder, ports| {
+            let bridge = format!(
+                "connection other\naddress 127.0.0.1:{}\ntopic # both 2\ncleansession true\nnotifications false\n",
+                ports[0]
+            );
+            let mut nodes = Vec::new();
+            for (number, port) in ports.iter().enumerate() {
+                let file = folder.join(format!("node-{number}.conf"));
+                let text = format!(
+                    "listener {port} 127.0.0.1\nallow_anonymous true\nmax_queued_messages 0\nmax_inflight_messages 0\n{}",
+                    if number == 0 { "" } else { &bridge }
+                );
+                fs::write(&file, text).unwrap();
+                nodes.push(Process::start(Command::new("mosquitto").arg("-c").arg(&file))?);
+            }
+            Some(nodes)
+        })
+    }
+
     /// Starts nodes until both let clients in. Ports are guessed, and another test may be faster, hence several tries.
     fn start(nodes: impl Fn(&Path, [u16; 2]) -> Option<Vec<Process>>) -> Option<Self> {
         let begun = Instant::now();

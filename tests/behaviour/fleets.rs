@@ -1,6 +1,7 @@
 //! One fleet of several processes before one master control, at the two nodes of a cluster of brokers.
 
 use std::fs;
+use std::time::Duration;
 
 use serde_json::Value;
 
@@ -207,6 +208,20 @@ fn four_processes_at_two_nodes_of_rabbitmq_are_one_fleet_and_a_killed_one_is_mis
     let again = fleet.start(3).end().code(0);
     for other in ["mock-1/", "mock-20/", "mock-31/"] {
         assert!(!again.stderr.contains(other), "{}", again.stderr);
+    }
+    fleet.merge(&[1, 2, 3, 4], "whole").code(0);
+    fleet.is_whole("whole");
+}
+
+#[test]
+#[ignore = "takes minutes and all of the machine; BENCHMARKS.md has its figures"]
+fn five_thousand_vehicles_of_four_processes_at_two_brokers_are_judged_each() {
+    let Some(cluster) = Cluster::mosquitto() else { return };
+    let fleet = Fleet::before_a_master_control(cluster, 5_000, 4);
+    let parts = [1, 2, 3, 4].map(|part| (part, fleet.start(part)));
+    for (part, running) in parts {
+        running.end_within(Duration::from_secs(1_200)).code(0);
+        assert_eq!(fleet.result(part)["verdict"], "pass", "part {part}");
     }
     fleet.merge(&[1, 2, 3, 4], "whole").code(0);
     fleet.is_whole("whole");

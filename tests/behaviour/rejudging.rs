@@ -245,3 +245,67 @@ fn a_harness_that_is_killed_leaves_a_journal_that_is_judged_as_far_as_it_goes() 
     assert_eq!(verdict(BEFORE), "pass", "what was decided before stands");
     assert_eq!(verdict(WATCHING.0), "inconclusive");
 }
+
+/// What a report shows of the message with this number: its text without markup, and without the spaces it is laid out with.
+fn shown(page: &str, number: u64) -> String {
+    let (_, rest) = page.split_once(&format!("id=\"m{number}\"")).unwrap();
+    let (_, rest) = rest.split_once("<div class=\"source\"").unwrap();
+    let (_, line) = rest.lines().next().unwrap().split_once('>').unwrap();
+    let text: String = line.split('<').map(|part| part.rsplit('>').next().unwrap()).collect();
+    let text = text.replace("&#34;", "\"").replace("&#60;", "<").replace("&#62;", ">");
+    without_spaces(&text.replace("&#38;", "&"))
+}
+
+fn without_spaces(text: &str) -> String {
+    text.chars().filter(|c| !c.is_whitespace()).collect()
+}
+
+#[test]
+fn of_a_fleet_the_first_and_the_last_message_are_in_the_report_as_they_were_though_the_run_keeps_few() {
+    let bench = Bench::new();
+    let fleet = [
+        "run",
+        "--virtual",
+        "--role",
+        "master-control",
+        "--vehicles",
+        "4",
+        "--seed",
+        "3",
+    ];
+    let tests = [
+        "fleet",
+        "dispatch/one-edge",
+        "order-update/there-and-back",
+        "order-update/lost-state",
+    ];
+    bench
+        .run(&[&fleet[..], &["--fault", "version-missing"], &tests].concat())
+        .code(1);
+    let records: Vec<Value> = bench
+        .journal()
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    let page = fs::read_to_string(bench.bundle().join("report.html")).unwrap();
+    let sent = records.iter().filter_map(|record| {
+        let number = record["seq"].as_u64().unwrap();
+        let payload = record["event"]["payload"].as_str()?;
+        page.contains(&format!("id=\"m{number}\"")).then_some((number, payload))
+    });
+    let all: Vec<(u64, &str)> = sent.collect();
+    let (first, last) = (all[0], all[all.len() - 1]);
+    assert!(last.0 - first.0 > 1_000, "#{} to #{}", first.0, last.0);
+    assert!(records.len() as u64 - first.0 > 1_000, "{} records", records.len());
+    let folder = bench.bundle().display().to_string();
+    for (number, payload) in [first, last] {
+        assert_eq!(shown(&page, number), without_spaces(payload), "#{number}");
+        let told = bench.run(&["report", &folder, "--message", &number.to_string(), "--format", "json"]);
+        let told: Value = serde_json::from_str(&told.code(0).stdout).unwrap();
+        assert_eq!(told["event"]["payload"], payload, "#{number}");
+    }
+    bench.is_whole();
+    bench.run(&["report", &folder]).code(1);
+    let again = fs::read_to_string(bench.bundle().join("report.html")).unwrap();
+    assert!(again == page, "the report that is made of the journal is another one");
+}

@@ -17,6 +17,7 @@ use tck_pack::Pack;
 use tck_report::issues::{self, Issue};
 use tck_report::junit::{self, JunitError};
 use tck_report::manifest::{Manifest, ManifestError};
+use tck_report::markdown_table::{Column, table};
 use tck_report::sources::Sources;
 use tck_report::statement::many;
 
@@ -97,11 +98,11 @@ pub fn markdown(result: &AuditResult) -> String {
         text.push_str(&format!("{}\n\n", plain(&sentence)));
     }
     let rows = rows(result);
-    if !rows.is_empty() {
-        text.push_str("| Verdict | Who | Requirement | What | Times | Where |\n|---|---|---|---|---|---|\n");
+    if rows.is_empty() {
+        return text;
     }
-    for (vehicle, side) in rows {
-        for mistake in side.mistakes() {
+    let rows = rows.into_iter().flat_map(|(vehicle, side)| {
+        side.mistakes().into_iter().map(move |mistake| {
             let cells = [
                 mistake.worst.verdict.word().to_owned(),
                 named(vehicle, side),
@@ -110,10 +111,11 @@ pub fn markdown(result: &AuditResult) -> String {
                 mistake.count.to_string(),
                 place(mistake.worst, result),
             ];
-            let cells = cells.map(|cell| plain(&cell));
-            text.push_str(&format!("| {} |\n", cells.join(" | ")));
-        }
-    }
+            cells.map(|cell| plain(&cell))
+        })
+    });
+    let columns = ["Verdict", "Who", "Requirement", "What", "Times", "Where"];
+    text.push_str(&table(columns.map(Column::Text), rows));
     text
 }
 

@@ -166,6 +166,27 @@ fn is_command(name: &str) -> bool {
 }
 
 /// What all vehicles share.
+struct Shared<'r> {
+    rules: &'r Rules,
+    options: Options,
+    places: Whence,
+    hints: OnceLock<Hints>,
+    live: bool,
+}
+
+impl Shared<'_> {
+    fn context(&self) -> AuditContext<'_> {
+        AuditContext {
+            rules: self.rules,
+            options: &self.options,
+            places: &self.places,
+            hints: &self.hints,
+            live: self.live,
+        }
+    }
+}
+
+/// What all vehicles share, for one of them.
 #[derive(Clone, Copy)]
 struct AuditContext<'a> {
     rules: &'a Rules,
@@ -179,8 +200,7 @@ struct AuditContext<'a> {
 
 /// Judges traffic nobody scripted by the monitors, message after message.
 pub struct Audit<'r> {
-    rules: &'r Rules,
-    options: Options,
+    shared: Shared<'r>,
     topics: Topics,
     vehicles: BTreeMap<String, Vehicle>,
     /// Cuts the time of each vehicle, where that is asked for.
@@ -193,10 +213,7 @@ pub struct Audit<'r> {
     beyond: u64,
     /// Messages of vehicles that another part judges.
     others: u64,
-    places: Whence,
-    hints: OnceLock<Hints>,
     misnamed: Misnamed,
-    live: bool,
     news: Vec<Found>,
     first: Option<jiff::Timestamp>,
     last: Option<jiff::Timestamp>,
@@ -231,20 +248,22 @@ impl<'r> Audit<'r> {
         }
         Ok(Self {
             topics: Topics::new(&rules.packs, options.topic_template.as_deref())?,
-            rules,
             cutter: options.cut.map(Cutter::new),
             ended: Vec::new(),
-            options,
+            shared: Shared {
+                rules,
+                options,
+                places: Whence::default(),
+                hints: OnceLock::new(),
+                live: false,
+            },
             vehicles: BTreeMap::new(),
             wires: MqttSessions::default(),
             messages: 0,
             elsewhere: 0,
             beyond: 0,
             others: 0,
-            places: Whence::default(),
-            hints: OnceLock::new(),
             misnamed: Misnamed::default(),
-            live: false,
             news: Vec::new(),
             first: None,
             last: None,
@@ -254,7 +273,7 @@ impl<'r> Audit<'r> {
     /// From now on what is found is told at once, see [`Audit::news`].
     #[must_use]
     pub fn live(mut self) -> Self {
-        self.live = true;
+        self.shared.live = true;
         self
     }
 
@@ -272,7 +291,10 @@ impl<'r> Audit<'r> {
     /// A topic of a vehicle that is wanted.
     fn wanted(&mut self, topic: &str) -> Option<Arc<Named>> {
         let named = self.topics.know(topic)?;
-        let wanted = self.options.wants_vehicle(&named.manufacturer, &named.serial_number);
+        let wanted = self
+            .shared
+            .options
+            .wants_vehicle(&named.manufacturer, &named.serial_number);
         wanted.then_some(named)
     }
 
@@ -280,8 +302,11 @@ impl<'r> Audit<'r> {
     #[must_use]
     pub fn address(&self, topic: &str) -> Option<Address> {
         let named = self.topics.read(topic)?;
-        let wanted = self.options.wants_vehicle(&named.manufacturer, &named.serial_number)
-            && self.options.does(&named.manufacturer, &named.serial_number);
+        let wanted = self
+            .shared
+            .options
+            .wants_vehicle(&named.manufacturer, &named.serial_number)
+            && self.shared.options.does(&named.manufacturer, &named.serial_number);
         wanted.then_some(Address {
             vehicle: named.key,
             manufacturer: named.manufacturer,
@@ -307,27 +332,31 @@ impl<'r> Audit<'r> {
             self.stray(number, &message);
             return;
         };
-        if !self.options.wants_vehicle(&named.manufacturer, &named.serial_number) {
+        if !self
+            .shared
+            .options
+            .wants_vehicle(&named.manufacturer, &named.serial_number)
+        {
             self.elsewhere += 1;
             return;
         }
-        if !self.options.does(&named.manufacturer, &named.serial_number) {
+        if !self.shared.options.does(&named.manufacturer, &named.serial_number) {
             self.others += 1;
             return;
         }
         let cutter = self.cutter.as_mut();
-        let cut = cutter.map(|cutter| cutter.place(&named, number, &message, self.rules));
+        let cut = cutter.map(|cutter| cutter.place(&named, number, &message, self.shared.rules));
         if let Some(place) = &cut {
             if place.begins {
                 self.end_stretch(&named.key);
             }
-            if !self.options.does_stretch(&named, place) {
+            if !self.shared.options.does_stretch(&named, place) {
                 self.others += 1;
                 return;
             }
         }
         let place: SourcePosition = message.place;
-        self.places.note(self.messages, place);
+        self.shared.places.note(self.messages, place);
         if !self.vehicles.contains_key(&named.key) {
             if self.vehicles.len() >= VEHICLES {
                 self.beyond += 1;
@@ -342,19 +371,13 @@ impl<'r> Audit<'r> {
             }
         }
         if let Some(vehicle) = self.vehicles.get_mut(&named.key) {
-            let scene = AuditContext {
-                rules: self.rules,
-                options: &self.options,
-                places: &self.places,
-                hints: &self.hints,
-                live: self.live,
-            };
+            let scene = self.shared.context();
             let carried = message.carried;
             let counts = vehicle.observe(self.messages, &named.name, message, scene);
             if let Some(carried) = carried.filter(|_| counts) {
                 self.wires.carried(carried, &named.key);
             }
-            if self.live {
+            if self.shared.live {
                 self.news.append(&mut vehicle.news());
             }
         }
@@ -365,13 +388,7 @@ impl<'r> Audit<'r> {
         let Some(vehicle) = self.vehicles.remove(key) else {
             return;
         };
-        let scene = AuditContext {
-            rules: self.rules,
-            options: &self.options,
-            places: &self.places,
-            hints: &self.hints,
-            live: self.live,
-        };
+        let scene = self.shared.context();
         let ended = vehicle.finish(scene);
         self.ended.extend(ended);
     }
@@ -382,13 +399,7 @@ impl<'r> Audit<'r> {
         let Some(vehicle) = self.vehicles.get_mut(key) else {
             return;
         };
-        let scene = AuditContext {
-            rules: self.rules,
-            options: &self.options,
-            places: &self.places,
-            hints: &self.hints,
-            live: self.live,
-        };
+        let scene = self.shared.context();
         for (number, name, message) in stored {
             vehicle.observe(number, &name, message, scene);
         }
@@ -399,7 +410,11 @@ impl<'r> Audit<'r> {
     pub fn concerns(&self, topic: &str) -> bool {
         let beside = || {
             let beside = self.topics.beside(topic)?;
-            Some(self.options.wants_vehicle(&beside.manufacturer, &beside.serial_number))
+            Some(
+                self.shared
+                    .options
+                    .wants_vehicle(&beside.manufacturer, &beside.serial_number),
+            )
         };
         self.address(topic).is_some() || beside().unwrap_or_default()
     }
@@ -408,15 +423,15 @@ impl<'r> Audit<'r> {
     fn stray(&mut self, number: u64, message: &Message) {
         self.elsewhere += 1;
         // It belongs to no stretch, and each part would find it.
-        if self.options.cut.is_some() {
+        if self.shared.options.cut.is_some() {
             return;
         }
         let wanted = |beside: &Beside| {
             let (maker, number) = (&beside.manufacturer, &beside.serial_number);
-            self.options.wants_vehicle(maker, number) && self.options.does(maker, number)
+            self.shared.options.wants_vehicle(maker, number) && self.shared.options.does(maker, number)
         };
         if let Some(beside) = self.topics.beside(&message.topic).filter(wanted) {
-            self.misnamed.note(&self.rules.packs, number, beside, message);
+            self.misnamed.note(&self.shared.rules.packs, number, beside, message);
         }
     }
 
@@ -443,26 +458,24 @@ impl<'r> Audit<'r> {
             } => self.topics.know(topic),
             _ => None,
         };
-        let wanted = |named: &&Arc<Named>| self.options.wants_vehicle(&named.manufacturer, &named.serial_number);
+        let wanted = |named: &&Arc<Named>| {
+            self.shared
+                .options
+                .wants_vehicle(&named.manufacturer, &named.serial_number)
+        };
         let publisher = named.as_ref().filter(wanted).map(|named| Publisher {
             vehicle: named.key.clone(),
             topic: &named.name,
-            elsewhere: elsewhere || !self.options.does(&named.manufacturer, &named.serial_number),
+            elsewhere: elsewhere || !self.shared.options.does(&named.manufacturer, &named.serial_number),
         });
-        let scene = AuditContext {
-            rules: self.rules,
-            options: &self.options,
-            places: &self.places,
-            hints: &self.hints,
-            live: self.live,
-        };
+        let scene = self.shared.context();
         let missing = self.wires.take(wire, number, publisher, &mut self.vehicles, scene);
         for key in missing {
             if let Some(vehicle) = self.vehicles.get_mut(&key) {
                 vehicle.interrupted(scene);
             }
         }
-        if self.live {
+        if self.shared.live {
             for vehicle in self.vehicles.values_mut() {
                 self.news.append(&mut vehicle.news());
             }
@@ -471,16 +484,10 @@ impl<'r> Audit<'r> {
 
     /// Nothing was seen for a while: nobody knows what every vehicle did meanwhile.
     fn interrupted(&mut self) {
-        let scene = AuditContext {
-            rules: self.rules,
-            options: &self.options,
-            places: &self.places,
-            hints: &self.hints,
-            live: self.live,
-        };
+        let scene = self.shared.context();
         for vehicle in self.vehicles.values_mut() {
             vehicle.interrupted(scene);
-            if self.live {
+            if self.shared.live {
                 self.news.append(&mut vehicle.news());
             }
         }
@@ -490,11 +497,8 @@ impl<'r> Audit<'r> {
     #[must_use]
     pub fn finish(mut self, recordings: Vec<Recording>) -> AuditResult {
         let scene = AuditContext {
-            rules: self.rules,
-            options: &self.options,
-            places: &self.places,
-            hints: &self.hints,
             live: false,
+            ..self.shared.context()
         };
         for vehicle in self.vehicles.values_mut() {
             vehicle.ready(scene);
@@ -502,7 +506,7 @@ impl<'r> Audit<'r> {
         self.wires.finish(&mut self.vehicles, scene);
         let last = self.vehicles.into_values().flat_map(|vehicle| vehicle.finish(scene));
         let mut vehicles: Vec<VehicleResult> = self.ended.into_iter().chain(last).collect();
-        if self.options.cut.is_some() {
+        if self.shared.options.cut.is_some() {
             vehicles.sort_by(|one, other| one.in_order().cmp(&other.in_order()));
         }
         let mut result = AuditResult {
@@ -521,8 +525,8 @@ impl<'r> Audit<'r> {
             master_control: None,
             vehicles,
         };
-        self.misnamed.tell(&mut result, self.rules, &self.options);
-        result.trace(&self.rules.catalogue);
+        self.misnamed.tell(&mut result, self.shared.rules, &self.shared.options);
+        result.trace(&self.shared.rules.catalogue);
         result.conclude();
         result
     }

@@ -73,7 +73,7 @@ impl WorkerPool<'_> {
     pub fn take(&mut self, told: Told) {
         match told {
             Told::Message(message) => self.message(message),
-            Told::Wire(_) if self.desk.options.cut.is_some() => self.has_packets = true,
+            Told::Wire(_) if self.desk.shared.options.cut.is_some() => self.has_packets = true,
             Told::Wire(wire) => {
                 let number = self.desk.messages + 1;
                 let owner = match &wire.event {
@@ -105,7 +105,7 @@ impl WorkerPool<'_> {
             desk.stray(desk.messages, &message);
             return;
         };
-        if !desk.options.does(&named.manufacturer, &named.serial_number) {
+        if !desk.shared.options.does(&named.manufacturer, &named.serial_number) {
             desk.others += 1;
             return;
         }

@@ -8,6 +8,7 @@ use crate::place::Settled;
 use tck_base::verdict::Verdict;
 use tck_report::clean::{line, short};
 use tck_report::junit::{self, JunitError, Plain};
+use tck_report::markdown_table::{Column, cell, table};
 
 /// The format of a summary.
 pub const FORMAT: &str = "vda5050-tck.campaign/1";
@@ -116,25 +117,25 @@ impl Summary {
     /// The summary in Markdown.
     #[must_use]
     pub fn markdown(&self) -> String {
-        let mut text = format!(
-            "## Campaign {}\n\n{} of {} carried out; exit code {}.\n\n| Device | Suite | Outcome | What | Bundle |\n|---|---|---|---|---|\n",
+        let rows = self.entries.iter().map(|one| {
+            let bundle = one.bundle.as_deref().unwrap_or_default();
+            [
+                cell(&one.device),
+                cell(&one.suite),
+                one.word().to_owned(),
+                cell(&one.said),
+                cell(bundle),
+            ]
+        });
+        let columns = ["Device", "Suite", "Outcome", "What", "Bundle"].map(Column::Text);
+        format!(
+            "## Campaign {}\n\n{} of {} carried out; exit code {}.\n\n{}",
             cell(&self.campaign),
             self.done(),
             self.entries.len(),
-            self.exit
-        );
-        for one in &self.entries {
-            let _ = writeln!(
-                text,
-                "| {} | {} | {} | {} | {} |",
-                cell(&one.device),
-                cell(&one.suite),
-                one.word(),
-                cell(&one.said),
-                cell(one.bundle.as_deref().unwrap_or_default())
-            );
-        }
-        text
+            self.exit,
+            table(columns, rows)
+        )
     }
 
     /// The summary as JUnit XML: a suite for each device, a case for each of its runs.
@@ -203,25 +204,6 @@ impl Line {
             None => "not run",
         }
     }
-}
-
-/// One cell of a table, in which nothing is markup.
-fn cell(text: &str) -> String {
-    let text = short(&line(text), 600).into_owned();
-    let mut safe = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => safe.push_str("&amp;"),
-            '<' => safe.push_str("&lt;"),
-            '>' => safe.push_str("&gt;"),
-            '\\' | '`' | '*' | '_' | '[' | ']' | '|' | '#' | '!' | '~' | '@' => {
-                safe.push('\\');
-                safe.push(character);
-            }
-            _ => safe.push(character),
-        }
-    }
-    safe
 }
 
 #[cfg(test)]

@@ -403,6 +403,7 @@ impl Trace {
         let mut findings = Vec::new();
         let mut judged = 0;
         for entry in self.journal.entries() {
+            let entry = &entry;
             match self.place(entry) {
                 Some((vehicle, name)) => fleet.borrow_mut().note(entry, vehicle, &name, setting.pack.names()),
                 None => fleet.borrow_mut().link(entry),

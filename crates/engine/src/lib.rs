@@ -250,7 +250,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
     }
 
     fn last_seq(&self) -> u64 {
-        self.recorder.journal().entries().last().map_or(0, |entry| entry.seq())
+        self.recorder.journal().last_seq()
     }
 
     /// Whether nothing would come of cancelling: the device is gone, is known not to obey, or has said since the last
@@ -271,8 +271,8 @@ impl<L: Link, O: Operator> Engine<L, O> {
     /// may have kept it from what the master control still wants, and an order has come since the last thing asked for.
     fn spares_calling_off(&self, begun: u64) -> bool {
         let judge = self.recorder.judge();
-        let entries = self.recorder.journal().entries();
-        let mut own = entries.iter().rev().take_while(|entry| entry.seq() > begun);
+        let entries = self.recorder.journal().beside_messages();
+        let mut own = entries.rev().take_while(|entry| entry.seq() > begun);
         let answered = judge.timeline().of("order").last().map_or(0, |order| order.seq());
         let open = own.any(|entry| match entry.event() {
             Event::Vehicle { .. } => true,
@@ -295,8 +295,8 @@ impl<L: Link, O: Operator> Engine<L, O> {
 
     /// Whether this test has released the emergency stop already, and the device has shown that since: nobody is asked twice.
     fn is_released(&self, begun: u64) -> bool {
-        let entries = self.recorder.journal().entries();
-        let mut own = entries.iter().rev().take_while(|entry| entry.seq() > begun);
+        let entries = self.recorder.journal().beside_messages();
+        let mut own = entries.rev().take_while(|entry| entry.seq() > begun);
         let last = own.find_map(|entry| match entry.event() {
             Event::Hook { hook, ok: true, .. } => Some((self.releases(hook), entry.seq())),
             Event::Hook { .. } => Some((false, 0)),

@@ -6,8 +6,8 @@ use super::flood::FloodGuard;
 use tck_base::clock::{Moment, WallClock};
 use tck_journal::event::{Event, Occurrence, Packet};
 use tck_journal::file::JournalWriter;
-use tck_journal::{Entry, Histogram, Journal, Spread};
-use tck_judge::{JudgeError, NAMED_VEHICLES, Rules, RunJudge, judged};
+use tck_journal::{Entry, Histogram, Journal, LostRecord, Spread};
+use tck_judge::{JudgeError, Rules, RunJudge, judged};
 
 /// Why something could not be recorded.
 #[derive(Debug, thiserror::Error)]
@@ -15,13 +15,13 @@ pub enum RecordError {
     /// The file cannot be written.
     #[error("cannot write the journal: {0}")]
     Write(#[from] std::io::Error),
+    /// What was written is not there any more.
+    #[error(transparent)]
+    Lost(#[from] LostRecord),
     /// The judge refuses the journal.
     #[error(transparent)]
     Judge(#[from] JudgeError),
 }
-
-/// What mock AGVs have said is kept as it was read for so many records; further back, its text is enough.
-const READ: usize = 1_000;
 
 /// Is shown every record once it is written and judged.
 pub type Onlooker = Box<dyn FnMut(&Arc<Entry>) + Send>;
@@ -76,16 +76,25 @@ impl Recorder {
     ) -> Result<Self, RecordError> {
         let mut journal = earlier.unwrap_or_default();
         let before = match journal.entries() {
-            [] => None,
+            none if none.is_empty() => None,
             entries => Some(judged(rules, entries)?),
         };
         let mut guard = FloodGuard::default();
         for entry in journal.entries() {
-            guard.observe_earlier(entry);
+            guard.observe_earlier(&entry);
         }
         let entry = journal.append(first);
+        let has_crowd = matches!(entry.event(), Event::RunBegun { header } if header.has_crowd());
+        if has_crowd && writer.is_none() {
+            let mut temporary = JournalWriter::temporary()?;
+            for entry in journal.entries().within((1, entry.seq() - 1)) {
+                temporary.write(&entry.record)?;
+            }
+            writer = Some(temporary);
+        }
         if let Some(writer) = &mut writer {
             writer.write(&entry.record)?;
+            journal.set_shelf(writer.shelf());
         }
         let mut judge = match before {
             Some(before) => before.resumed(&entry)?,
@@ -102,7 +111,7 @@ impl Recorder {
             leaves_out: false,
             onlooker: None,
             stopwatch: None,
-            has_crowd: matches!(entry.event(), Event::RunBegun { header } if header.vehicles.len() > NAMED_VEHICLES),
+            has_crowd,
         })
     }
 
@@ -129,7 +138,7 @@ impl Recorder {
     /// is left out comes back with the number of the last record.
     pub fn record(&mut self, occurrence: Occurrence) -> Result<Arc<Entry>, RecordError> {
         if self.guard.is_beset(occurrence.at.moment) && self.judge.can_do_without(&occurrence) {
-            let last = self.journal.entries().last().map_or(0, |entry| entry.seq());
+            let last = self.journal.last_seq();
             if !std::mem::replace(&mut self.leaves_out, true) {
                 let text = "clients that are not the device do more than is recorded; until they do less, what has nothing to do \
                             with the device is left out"
@@ -156,7 +165,7 @@ impl Recorder {
             stopwatch.note(&entry);
         }
         if self.has_crowd {
-            self.guard.let_go(self.journal.forget_reading(READ));
+            self.guard.let_go(self.journal.let_go(Journal::RECENT));
         }
         if let Some(onlooker) = &mut self.onlooker {
             onlooker(&entry);
@@ -184,11 +193,11 @@ impl Recorder {
         &self.journal
     }
 
-    /// Makes sure the file is on the disk.
+    /// Makes sure the file is on the disk, and that what was asked for of it came back.
     pub fn sync(&self) -> Result<(), RecordError> {
-        self.writer
-            .as_ref()
-            .map_or(Ok(()), JournalWriter::sync)
-            .map_err(RecordError::Write)
+        if let Some(writer) = &self.writer {
+            writer.sync()?;
+        }
+        self.journal.lost().map_or(Ok(()), |lost| Err(lost.clone().into()))
     }
 }

@@ -2,9 +2,10 @@
 
 use std::fmt::Write as _;
 
-use crate::series::{History, Series};
+use crate::course::Course;
+use crate::series::{History, Run, Series};
 use crate::words;
-use tck_report::clean::{line, short};
+use tck_report::markdown_table::{Column, cell, table};
 
 /// How many rows a table has at most: a summary page is bounded.
 const ROWS: usize = 100;
@@ -21,16 +22,10 @@ pub fn markdown(history: &History) -> String {
         of_series(series, &mut text);
     }
     if !history.left_out.is_empty() {
-        text.push_str("\n### Left out\n\n| Bundle | Why | What |\n|---|---|---|\n");
-        for one in history.left_out.iter().take(ROWS) {
-            let _ = writeln!(
-                text,
-                "| {} | {} | {} |",
-                cell(&one.path),
-                one.why.word(),
-                cell(&one.text)
-            );
-        }
+        text.push_str("\n### Left out\n\n");
+        let rows = history.left_out.iter().take(ROWS);
+        let rows = rows.map(|one| [cell(&one.path), one.why.word().to_owned(), cell(&one.text)]);
+        text.push_str(&table(["Bundle", "Why", "What"].map(Column::Text), rows));
         more(history.left_out.len(), &mut text);
     }
     text
@@ -46,74 +41,60 @@ fn of_series(series: &Series, text: &mut String) {
     let _ = writeln!(text, "Requirements: {}.", words::counts(series));
     let news = series.news();
     if !news.is_empty() {
-        text.push_str(
-            "\n| State | Requirement | Since | What lies between | Seen | Evidence |\n|---|---|---|---|---|---|\n",
-        );
-    }
-    for course in news.iter().take(ROWS) {
-        let evidence: Vec<String> = words::evidence(course, series)
-            .iter()
-            .map(|run| cell(&run.path))
-            .collect();
-        let _ = writeln!(
-            text,
-            "| {} | **{}** | {} | {} | {} | {} |",
-            course.state.word(),
-            cell(&course.id),
-            cell(&words::since(course, series)),
-            cell(&words::between(course).unwrap_or_default()),
-            cell(course.text.as_deref().unwrap_or_default()),
-            evidence.join(", ")
-        );
+        let columns = ["State", "Requirement", "Since", "What lies between", "Seen", "Evidence"];
+        let rows = news.iter().take(ROWS).map(|course| of_course(course, series));
+        text.push('\n');
+        text.push_str(&table(columns.map(Column::Text), rows));
     }
     more(news.len(), text);
-    text.push_str(
-        "\n| Run | Began | Verdict | Decided | Changed since the run before | Bundle |\n|---:|---|---|---:|---|---|\n",
-    );
+    let columns = [
+        Column::Number("Run"),
+        Column::Text("Began"),
+        Column::Text("Verdict"),
+        Column::Number("Decided"),
+        Column::Text("Changed since the run before"),
+        Column::Text("Bundle"),
+    ];
     let left = series.runs.len().saturating_sub(ROWS);
-    for run in &series.runs[left..] {
-        let marks: Vec<String> = words::marks(run)
-            .iter()
-            .map(|mark| format!(" ({})", cell(mark)))
-            .collect();
-        let _ = writeln!(
-            text,
-            "| {} | {} | {}{} | {} | {} | {} |",
-            run.number,
-            words::begun(run),
-            words::verdict(run.verdict),
-            marks.concat(),
-            run.decided,
-            cell(&words::changes(&run.changes)),
-            cell(&run.path)
-        );
-    }
+    text.push('\n');
+    text.push_str(&table(columns, series.runs[left..].iter().map(of_run)));
     if left > 0 {
         let _ = writeln!(text, "\n… and {left} earlier runs");
     }
+}
+
+fn of_course(course: &Course, series: &Series) -> [String; 6] {
+    let evidence: Vec<String> = words::evidence(course, series)
+        .iter()
+        .map(|run| cell(&run.path))
+        .collect();
+    [
+        course.state.word().to_owned(),
+        format!("**{}**", cell(&course.id)),
+        cell(&words::since(course, series)),
+        cell(&words::between(course).unwrap_or_default()),
+        cell(course.text.as_deref().unwrap_or_default()),
+        evidence.join(", "),
+    ]
+}
+
+fn of_run(run: &Run) -> [String; 6] {
+    let marks: Vec<String> = words::marks(run)
+        .iter()
+        .map(|mark| format!(" ({})", cell(mark)))
+        .collect();
+    [
+        run.number.to_string(),
+        words::begun(run),
+        format!("{}{}", words::verdict(run.verdict), marks.concat()),
+        run.decided.to_string(),
+        cell(&words::changes(&run.changes)),
+        cell(&run.path),
+    ]
 }
 
 fn more(all: usize, text: &mut String) {
     if all > ROWS {
         let _ = writeln!(text, "\n… and {} more; the JSON has all", all - ROWS);
     }
-}
-
-/// One cell of a table, in which nothing is markup.
-fn cell(text: &str) -> String {
-    let text = short(&line(text), 600).into_owned();
-    let mut safe = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => safe.push_str("&amp;"),
-            '<' => safe.push_str("&lt;"),
-            '>' => safe.push_str("&gt;"),
-            '\\' | '`' | '*' | '_' | '[' | ']' | '|' | '#' | '!' | '~' | '@' => {
-                safe.push('\\');
-                safe.push(character);
-            }
-            _ => safe.push(character),
-        }
-    }
-    safe
 }

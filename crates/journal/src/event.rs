@@ -11,7 +11,8 @@ pub use super::latency::OwnLatency;
 pub use super::packet::{Close, Filter, Packet, Will};
 pub use super::payload::{PAYLOAD_LIMIT, PAYLOAD_PREFIX, Payload, hex};
 pub use super::plan::{
-    Capability, DIVIDED_TESTS, DIVIDED_VEHICLES, Gate, MockVehicle, Plan, PlannedTest, RunHeader, Setting, ShardRecord,
+    Capability, DIVIDED_TESTS, DIVIDED_VEHICLES, Gate, MockVehicle, NAMED_VEHICLES, Plan, PlannedTest, RunHeader,
+    Setting, ShardRecord,
 };
 pub use super::program::{Ending, Origin, Program};
 pub use super::vantage::Direction;

@@ -7,15 +7,17 @@
 //! that ends too early shows by its last record, which is not the end of a run.
 
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Write};
+use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use flate2::Compression;
 use flate2::bufread::MultiGzDecoder;
 use flate2::write::GzEncoder;
 use sha2::{Digest as _, Sha256};
 
-use super::event::hex;
+use super::event::{Event, hex};
+use super::shelf::Shelf;
 use super::{Journal, Record};
 
 /// The name of a journal in a bundle.
@@ -57,11 +59,10 @@ pub fn pack(folder: &Path) -> io::Result<()> {
 /// Writes records through to a file.
 #[derive(Debug)]
 pub struct JournalWriter {
-    file: File,
+    shelf: Arc<Shelf>,
     line: Vec<u8>,
     /// The hash of the line that was written last.
     last: Option<String>,
-    written: u64,
 }
 
 impl JournalWriter {
@@ -70,12 +71,24 @@ impl JournalWriter {
     /// # Errors
     /// What the operating system says.
     pub fn create(path: &Path) -> io::Result<Self> {
-        Ok(Self {
-            file: File::options().write(true).create_new(true).open(path)?,
+        let file = File::options().read(true).write(true).create_new(true).open(path)?;
+        Ok(Self::to(Shelf::new(file)))
+    }
+
+    /// Writes to a file that nobody else sees, and that is gone with this process.
+    ///
+    /// # Errors
+    /// What the operating system says.
+    pub fn temporary() -> io::Result<Self> {
+        Ok(Self::to(Shelf::temporary()?))
+    }
+
+    fn to(shelf: Shelf) -> Self {
+        Self {
+            shelf: Arc::new(shelf),
             line: Vec::new(),
             last: None,
-            written: 0,
-        })
+        }
     }
 
     /// Creates the file with the records of another one in it, byte for byte, to go on with them. A last line that is cut
@@ -85,12 +98,11 @@ impl JournalWriter {
     /// What the operating system says.
     pub fn going_on(path: &Path, before: &Path) -> io::Result<Self> {
         let mut writer = Self::create(path)?;
-        let mut reader = open(before)?;
+        let (mut reader, _) = open(before)?;
         let mut line = Vec::new();
         while reader.read_until(b'\n', &mut line)? > 0 {
             if line.ends_with(b"\n") {
-                writer.file.write_all(&line)?;
-                writer.written += line.len() as u64;
+                writer.shelf.append(&line)?;
                 writer.last = Some(hash(&line));
             }
             line.clear();
@@ -110,8 +122,7 @@ impl JournalWriter {
         };
         serde_json::to_writer(&mut self.line, &chained)?;
         self.line.push(b'\n');
-        self.written += self.line.len() as u64;
-        self.file.write_all(&self.line)?;
+        self.shelf.append(&self.line)?;
         self.last = Some(hash(&self.line));
         Ok(())
     }
@@ -119,7 +130,13 @@ impl JournalWriter {
     /// How many bytes were written.
     #[must_use]
     pub fn written(&self) -> u64 {
-        self.written
+        self.shelf.written()
+    }
+
+    /// Where records are read back from.
+    #[must_use]
+    pub fn shelf(&self) -> &Arc<Shelf> {
+        &self.shelf
     }
 
     /// Waits until the records are on the disk.
@@ -127,7 +144,7 @@ impl JournalWriter {
     /// # Errors
     /// What the operating system says.
     pub fn sync(&self) -> io::Result<()> {
-        self.file.sync_all()
+        self.shelf.sync()
     }
 }
 
@@ -186,15 +203,45 @@ pub struct Recording {
     pub torn: bool,
 }
 
-/// The lines of a journal.
-fn open(path: &Path) -> io::Result<Box<dyn BufRead>> {
+/// The lines of a journal, and whether it is packed.
+fn open(path: &Path) -> io::Result<(Box<dyn BufRead>, bool)> {
     let mut file = BufReader::new(File::open(path)?);
     let is_packed = file.fill_buf()?.starts_with(&[0x1f, 0x8b]);
-    Ok(if is_packed {
+    let lines: Box<dyn BufRead> = if is_packed {
         Box::new(BufReader::new(MultiGzDecoder::new(file)))
     } else {
         Box::new(file)
-    })
+    };
+    Ok((lines, is_packed))
+}
+
+/// Where the records of a journal are read back from that is too long for memory.
+struct ReadBack {
+    shelf: Arc<Shelf>,
+    /// The lines stand in the journal itself; of a packed one they are written to a temporary file.
+    are_there: bool,
+}
+
+impl ReadBack {
+    fn of(path: &Path, is_packed: bool) -> io::Result<Self> {
+        let shelf = if is_packed {
+            Shelf::temporary()?
+        } else {
+            Shelf::new(File::open(path)?)
+        };
+        Ok(Self {
+            shelf: Arc::new(shelf),
+            are_there: !is_packed,
+        })
+    }
+
+    fn add(&self, line: &[u8]) -> io::Result<()> {
+        if self.are_there {
+            self.shelf.has(line.len());
+            return Ok(());
+        }
+        self.shelf.append(line)
+    }
 }
 
 /// Reads a journal.
@@ -207,7 +254,8 @@ pub fn read(path: &Path) -> Result<Recording, ReadError> {
         source,
     };
     let mut journal = Journal::new();
-    let mut reader = open(path).map_err(io)?;
+    let (mut reader, is_packed) = open(path).map_err(io)?;
+    let mut read_back: Option<ReadBack> = None;
     let mut text = Vec::new();
     let mut line = 0;
     let mut last = 0;
@@ -246,7 +294,18 @@ pub fn read(path: &Path) -> Result<Recording, ReadError> {
                 }
                 before = Some(hash(&text));
                 last = record.seq;
+                if line == 1 && matches!(&record.event, Event::RunBegun { header } if header.has_crowd()) {
+                    let made = ReadBack::of(path, is_packed).map_err(io)?;
+                    journal.set_shelf(&made.shelf);
+                    read_back = Some(made);
+                }
+                if let Some(read_back) = &read_back {
+                    read_back.add(&text).map_err(io)?;
+                }
                 journal.restore(record);
+                if read_back.is_some() {
+                    journal.let_go(Journal::RECENT);
+                }
             }
             Err(_) if !text.ends_with(b"\n") => return Ok(Recording { journal, torn: true }),
             Err(error) => return Err(bad(error.to_string())),

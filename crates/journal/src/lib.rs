@@ -1,7 +1,7 @@
 //! The append-only record of everything that happened in a run; the only input of the judge.
 //!
-//! [`event`] says what can be recorded, [`Journal`] keeps the records in order in memory, [`file`] writes
-//! them through as JSON Lines and reads them back. What the records *mean* is left to the judge.
+//! [`event`] says what can be recorded, [`Journal`] has the records in order, [`file`] writes them through as JSON Lines and
+//! reads them back. What the records *mean* is left to the judge.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
@@ -17,7 +17,9 @@ mod plan;
 mod program;
 mod read;
 mod reason;
+mod records;
 mod serving;
+mod shelf;
 mod vantage;
 mod waiver;
 
@@ -33,7 +35,9 @@ pub use latency::{Histogram, OwnLatency, Spread};
 pub use plan::tool;
 use read::Read;
 pub use reason::{OwnError, Reason};
+pub use records::{Entries, Journal};
 pub use serving::ServeBehaviour;
+pub use shelf::{LostRecord, Shelf};
 pub use vantage::Vantage;
 
 use tck_base::clock::Stamp;
@@ -118,13 +122,6 @@ impl Entry {
         bytes + own.map_or(0, |read| read.parsed.weight())
     }
 
-    /// Forgets how it was read, which is done again when somebody asks. Gives about how many bytes of memory that frees.
-    fn forget(&mut self) -> u64 {
-        self.picture = OnceLock::new();
-        let read = self.read.take().filter(|read| Arc::strong_count(read) == 1);
-        read.map_or(0, |read| read.parsed.weight())
-    }
-
     fn shared(&self) -> Option<&Arc<Read>> {
         let payload = self.payload()?;
         Some(self.read.get_or_init(|| Arc::new(Read::of(payload))))
@@ -151,103 +148,5 @@ impl Entry {
             Event::Message { .. } | Event::Sent { .. } | Event::Retained { .. } => self.json().map(Cow::Borrowed),
             event => Some(Cow::Borrowed(self.picture.get_or_init(|| event.picture()))),
         }
-    }
-}
-
-/// The records of a run, in order.
-#[derive(Clone, Debug, Default)]
-pub struct Journal {
-    entries: Vec<Arc<Entry>>,
-    names: Arc<Names>,
-}
-
-impl Journal {
-    /// An empty journal.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// Appends what happened, giving it the next number (counted from 1).
-    pub fn append(&mut self, occurrence: event::Occurrence) -> Arc<Entry> {
-        let seq = self.entries.len() as u64 + 1;
-        let entry = Entry::new(occurrence.numbered(seq));
-        self.entries.push(Arc::clone(&entry));
-        entry
-    }
-
-    /// Takes over a record that already has its number, when reading a journal back.
-    pub fn restore(&mut self, record: Record) {
-        self.entries.push(Entry::new(record));
-    }
-
-    /// What the version of the run calls the members of messages; what 2.x calls them where nobody has said it.
-    #[must_use]
-    pub fn names(&self) -> &Names {
-        &self.names
-    }
-
-    /// Says what the version of the run calls the members of messages.
-    pub fn set_names(&mut self, names: &Arc<Names>) {
-        self.names = Arc::clone(names);
-    }
-
-    /// Forgets how the record was read that stands so many places before the last one, if nobody else holds it: what it says is
-    /// read again when somebody asks. Gives about how many bytes of memory that frees.
-    pub fn forget_reading(&mut self, places: usize) -> u64 {
-        let at = self.entries.len().checked_sub(places + 1);
-        let entry = at.and_then(|at| self.entries.get_mut(at)).and_then(Arc::get_mut);
-        entry.map_or(0, Entry::forget)
-    }
-
-    /// All records so far.
-    #[must_use]
-    pub fn entries(&self) -> &[Arc<Entry>] {
-        &self.entries
-    }
-
-    /// The record with a number.
-    #[must_use]
-    pub fn get(&self, seq: u64) -> Option<&Arc<Entry>> {
-        let at = self.entries.binary_search_by_key(&seq, |entry| entry.seq()).ok()?;
-        self.entries.get(at)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use event::Occurrence;
-    use tck_base::clock::Moment;
-
-    fn sent() -> Occurrence {
-        let at = Stamp {
-            moment: Moment::START,
-            utc: jiff::Timestamp::UNIX_EPOCH,
-        };
-        let event = Event::Sent {
-            topic: "state".to_owned(),
-            qos: 0,
-            retain: false,
-            payload: Payload::keep(br#"{ "nodeStates": [1, 2, 3] }"#.to_vec().into()),
-        };
-        Occurrence::harness(at, event)
-    }
-
-    #[test]
-    fn how_a_record_was_read_is_forgotten_where_nobody_holds_it_and_read_again_when_it_is_asked_for() {
-        let mut journal = Journal::new();
-        let held = journal.append(sent());
-        drop(journal.append(sent()));
-        drop(journal.append(sent()));
-        assert!(journal.entries().iter().all(|entry| entry.json().is_some()));
-        assert_eq!(journal.forget_reading(2), 0, "somebody holds it");
-        let freed = journal.forget_reading(1);
-        assert!(freed > 0);
-        assert_eq!(journal.forget_reading(1), 0, "there is nothing left to forget");
-        assert_eq!(journal.forget_reading(3), 0, "there is none so far back");
-        let again = journal.get(2).and_then(|entry| entry.json());
-        assert!(again.is_some() && again == held.json());
-        assert_eq!(journal.forget_reading(1), freed);
     }
 }

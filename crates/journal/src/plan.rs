@@ -50,6 +50,9 @@ pub fn tool() -> String {
     concat!("vda5050-tck ", env!("CARGO_PKG_VERSION")).to_owned()
 }
 
+/// How many mock AGVs tests talk about. What further ones say is left to the monitors.
+pub const NAMED_VEHICLES: usize = 2;
+
 /// What the run is about; the first record of every journal.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
@@ -94,6 +97,14 @@ pub struct RunHeader {
     /// Which part of a run it is; absent when it is all of it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shard: Option<ShardRecord>,
+}
+
+impl RunHeader {
+    /// Whether there are more mock AGVs than tests talk about.
+    #[must_use]
+    pub fn has_crowd(&self) -> bool {
+        self.vehicles.len() > NAMED_VEHICLES
+    }
 }
 
 /// What a part of a run restricts where its tests are divided.

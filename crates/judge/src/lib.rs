@@ -52,5 +52,5 @@ pub use run::{RESULT_FORMAT, RunJudge, judge, judged};
 pub use run_contexts::Ground;
 pub use step::Progress;
 pub use test::TestJudge;
-pub use timeline::{NAMED_VEHICLES, Timeline, client_of, number_of};
+pub use timeline::{Timeline, client_of, number_of};
 pub use traffic_judge::TrafficJudge;

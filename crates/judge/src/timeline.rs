@@ -17,12 +17,9 @@ use serde_json::Value;
 use super::gone::{Gone, Mark, Pulse};
 use tck_base::clock::{Moment, Stamp};
 use tck_journal::Entry;
-use tck_journal::event::{Direction, Event, MockVehicle, Packet};
+use tck_journal::event::{Direction, Event, MockVehicle, NAMED_VEHICLES, Packet};
 use tck_pack::Pack;
 use tck_view::{MessageView, Names, StateView, Topic};
-
-/// How many mock AGVs tests talk about. What further ones say is left to the monitors.
-pub const NAMED_VEHICLES: usize = 2;
 
 /// How the subjects of the second mock AGV end: `order@second`.
 pub const OF_SECOND: &str = "@second";

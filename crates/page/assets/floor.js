@@ -10,6 +10,7 @@
   let floor = null;
   let vehicle = null;
   let fleet = [];
+  let findings = [];
   let place = null;
 
   const draw = (kind, attributes, text) => {
@@ -27,6 +28,25 @@
     const [x, y] = place(one.x, one.y);
     const turned = ((-(one.theta || 0) * 180) / Math.PI).toFixed(1);
     draw("path", { d: "M 16 0 L -10 -10 L -5 0 L -10 10 Z", transform: `translate(${x.toFixed(1)} ${y.toFixed(1)}) rotate(${turned})`, class: "vehicle" });
+  }
+
+  // Findings at one place share a mark, which the worst of them gives its shape and the table explains by its number.
+  function marks() {
+    const all = new Map();
+    for (const { requirement, verdict, message, spot } of findings) {
+      const key = [spot.map, spot.x.toFixed(2), spot.y.toFixed(2)].join(" ");
+      const mark = all.get(key) || { spot, verdict, told: [] };
+      mark.told.push(`${requirement} ${verdict}: ${message}`);
+      all.set(key, mark);
+    }
+    return [...all.values()];
+  }
+
+  function drawMark({ spot, verdict }, number) {
+    const [x, y] = place(spot.x, spot.y);
+    const shape = verdict === "fail" ? "M -11 -11 L 11 11 M 11 -11 L -11 11" : "M 0 -12 L 12 10 L -12 10 Z";
+    draw("path", { d: shape, transform: `translate(${x.toFixed(1)} ${y.toFixed(1)})`, class: `mark ${verdict}` });
+    draw("text", { x: x + 14, y: y + 22, class: "mark" }, String(number));
   }
 
   // The vehicles of a watch, each map a picture of its own beside the others; nobody has said how their floors look.
@@ -57,6 +77,7 @@
   function scale(nodes) {
     const places = nodes.map(({ x, y }) => [x, y]);
     if (isSomewhere(vehicle)) places.push([vehicle.x, vehicle.y]);
+    for (const { spot } of findings) if (nodes.some((node) => node.map === spot.map)) places.push([spot.x, spot.y]);
     const xs = places.map(([x]) => x);
     const ys = places.map(([, y]) => y);
     const left = Math.min(...xs);
@@ -94,6 +115,7 @@
       row("Base ahead", ids(true).join(", ") || "none"),
       row("Horizon ahead", ids(false).join(", ") || "none"),
       row("Floor", `${floor.nodes.length} nodes, ${floor.edges.length} edges`),
+      ...marks().map(({ spot, told }, at) => row(`Mark ${at + 1}`, `x ${number(spot.x)} m, y ${number(spot.y)} m on ${spot.map || "no map"}: ${told.join("; ")}`)),
     );
   }
 
@@ -119,6 +141,9 @@
       if (nodes.length <= NAMED) draw("text", { x: x + 8, y: y - 8 }, node.id);
     }
     if (isSomewhere(vehicle)) arrow(vehicle);
+    marks().forEach((mark, at) => {
+      if (mark.spot.map === map) drawMark(mark, at + 1);
+    });
     table();
   }
 
@@ -130,6 +155,10 @@
     fleet(told) {
       fleet = told;
       if (floor === null) fleetPicture();
+    },
+    findings(told) {
+      findings = told;
+      picture();
     },
     vehicle(told) {
       vehicle = told;

@@ -107,7 +107,8 @@ function showQuestion(question) {
   letAnswer();
   put("question-said", "");
   if (!question) return title();
-  put("question-title", `Question ${question.number}: somebody has to do this`);
+  const of = question.of === undefined ? "" : ` of ${question.of}`;
+  put("question-title", `Prompt ${question.number}${of}: somebody has to do this`);
   put("question-text", question.text);
   put("question-test", [question.title, question.test].filter(Boolean).join(" – ") || "none");
   for (const id of ["question-step", "question-step-name"]) show(id, question.step !== null);
@@ -180,6 +181,7 @@ function showFindings(findings) {
     return item;
   });
   byId("findings").replaceChildren(...items);
+  window.floorPicture.findings(findings.filter(({ spot }) => spot));
 }
 
 function addMessages(messages, reset) {

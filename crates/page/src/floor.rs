@@ -1,5 +1,7 @@
 //! The course as a picture: the floor, the order in hand, and where the vehicle is.
 
+use std::collections::VecDeque;
+
 use serde::Serialize;
 
 use super::shown::{EXCERPT, NAME, shown};
@@ -8,6 +10,8 @@ use tck_course::GivesUp;
 
 /// How many places of the vehicle its trail has at most.
 const TRAIL: usize = 400;
+/// How many places of the vehicle are remembered with the record that told of them.
+const PLACES: usize = 4_096;
 /// How many errors of a vehicle are shown.
 const ERRORS: usize = 5;
 /// How many nodes and edges of an order are shown.
@@ -152,6 +156,53 @@ impl VehicleOnFloor {
             }
         }
         self
+    }
+}
+
+/// A place on a floor.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct Spot {
+    pub x: f64,
+    pub y: f64,
+    pub map: Option<String>,
+}
+
+impl Spot {
+    fn of(vehicle: &VehicleOnFloor) -> Option<Self> {
+        Some(Self {
+            x: vehicle.x.filter(|x| x.is_finite())?,
+            y: vehicle.y.filter(|y| y.is_finite())?,
+            map: vehicle.map.clone(),
+        })
+    }
+}
+
+/// From which record on the vehicle was where, as far back as it is remembered.
+#[derive(Debug, Default)]
+pub(crate) struct Whereabouts(VecDeque<(u64, Spot)>);
+
+impl Whereabouts {
+    /// Where the vehicle says that it is.
+    pub fn note(&mut self, record: u64, vehicle: &VehicleOnFloor) {
+        let Some(spot) = Spot::of(vehicle) else { return };
+        if self.0.back().is_some_and(|(_, last)| *last == spot) {
+            return;
+        }
+        if self.0.len() == PLACES {
+            self.0.pop_front();
+        }
+        self.0.push_back((record, spot));
+    }
+
+    /// Where it was at a record. `None` when it had said nothing of it, or that is too long ago.
+    pub fn at(&self, record: u64) -> Option<&Spot> {
+        let later = self.0.partition_point(|(since, _)| *since <= record);
+        self.0.get(later.checked_sub(1)?).map(|(_, spot)| spot)
+    }
+
+    /// Records begin anew.
+    pub fn clear(&mut self) {
+        self.0.clear();
     }
 }
 

@@ -7,13 +7,13 @@ use std::time::Duration;
 use serde_json::{Map, Value, json};
 use tokio::sync::watch;
 
-use super::floor::{FleetVehicle, Floor, Trail, VehicleOnFloor};
+use super::floor::{FleetVehicle, Floor, Spot, Trail, VehicleOnFloor, Whereabouts};
 use super::parts::{Asked, Fleet, Head, Line, Message, Phase, Row, Running, Step, from_now, now};
 use super::shown::{NAME, RECORD, SENTENCE, shown};
 use super::told::{Facts, Finding, Outcome, Planned, Prompt, StepFacts, TestFacts, Way};
 use tck_base::verdict::Verdict;
-use tck_journal::Entry;
 use tck_journal::event::Event;
+use tck_journal::{Entry, Journal, Shelf};
 
 /// How many of the last messages are shown each way.
 const MESSAGES: usize = 20;
@@ -69,11 +69,18 @@ struct Model {
     asks: BTreeMap<String, String>,
     floor: Part<Option<Floor>>,
     vehicle: Part<(VehicleOnFloor, Trail)>,
+    whereabouts: Whereabouts,
+    /// Where the vehicle was at the records that show findings.
+    marks: BTreeMap<u64, Option<Spot>>,
+    /// How many questions each test asks, by its id, and how many all tests of the plan do.
+    prompts: BTreeMap<String, u64>,
+    planned_prompts: u64,
     fleet: Part<Fleet>,
     messages: VecDeque<Message>,
     lines: VecDeque<Line>,
-    /// All records of the run; the journal keeps them, too.
-    records: Vec<Arc<Entry>>,
+    /// The last records of the run; all of them where the journal cannot be read back.
+    records: VecDeque<Arc<Entry>>,
+    journal: Option<Arc<Shelf>>,
 }
 
 impl Default for Page {
@@ -101,6 +108,9 @@ impl Page {
         self.change(|model, change| {
             model.begun_anew = change;
             model.records.clear();
+            model.journal = None;
+            model.whereabouts.clear();
+            model.marks.clear();
             model.messages.clear();
             for line in &mut model.lines {
                 line.record = None;
@@ -120,6 +130,16 @@ impl Page {
         });
     }
 
+    /// How many questions a person is asked in each test, by its id.
+    pub fn prompts(&self, prompts: BTreeMap<String, u64>) {
+        self.change(|model, _| model.prompts = prompts);
+    }
+
+    /// Where older records are read back from.
+    pub fn reads_back(&self, journal: &Arc<Shelf>) {
+        self.change(|model, _| model.journal = Some(Arc::clone(journal)));
+    }
+
     /// The bench stands, and a device is expected there.
     pub fn expects(&self, address: &str) {
         self.change(|model, change| {
@@ -134,6 +154,8 @@ impl Page {
     /// The tests of the run are known.
     pub fn planned(&self, tests: Vec<Planned>) {
         self.change(|model, change| {
+            let asking = tests.iter().filter(|planned| planned.left_out.is_none());
+            model.planned_prompts = asking.filter_map(|planned| model.prompts.get(&planned.test)).sum();
             let rows = tests.into_iter().take(TESTS).map(|planned| Row {
                 test: shown(&planned.test, NAME),
                 state: if planned.left_out.is_some() { "left-out" } else { "left" },
@@ -153,6 +175,7 @@ impl Page {
         self.change(|model, change| {
             let test = shown(&facts.test, NAME);
             model.begin_to_run(change);
+            model.begin_trail(change);
             model.row(&test, "runs", None, change);
             model.line("test", format!("{test} begins"), None);
             let running = Running {
@@ -231,6 +254,7 @@ impl Page {
                 }
             }
             model.findings.set(worst_first(all), change);
+            model.mark();
         });
     }
 
@@ -240,6 +264,7 @@ impl Page {
         self.change(|model, change| {
             if model.findings.value != findings {
                 model.findings.set(findings, change);
+                model.mark();
             }
         });
     }
@@ -261,6 +286,8 @@ impl Page {
             let text = shown(&prompt.text, SENTENCE);
             let asked = Asked {
                 number: prompt.number,
+                // More are asked than planned when something has to be tried again.
+                of: Some(model.planned_prompts).filter(|of| prompt.number <= *of),
                 test: running.map(|test| test.test.clone()),
                 title: running.map(|test| test.title.clone()),
                 why: running.map(|test| test.why.clone()),
@@ -287,7 +314,10 @@ impl Page {
     /// other side.
     pub fn saw(&self, entry: &Arc<Entry>, message: Option<(&str, Way)>) {
         self.change(|model, change| {
-            model.records.push(Arc::clone(entry));
+            model.records.push_back(Arc::clone(entry));
+            if model.journal.is_some() && model.records.len() > Journal::RECENT {
+                model.records.pop_front();
+            }
             model.count_connections(entry, change);
             if let Some((topic, way)) = message {
                 model.keep(Message {
@@ -317,6 +347,8 @@ impl Page {
             let (now, trail) = &mut model.vehicle.value;
             if *now != vehicle {
                 trail.goes_on(&vehicle);
+                let record = model.records.back().map_or(0, |entry| entry.seq());
+                model.whereabouts.note(record, &vehicle);
                 *now = vehicle;
                 model.vehicle.changed = change;
             }
@@ -395,8 +427,12 @@ impl Page {
     pub(crate) fn record(&self, number: u64) -> Option<String> {
         let entry = {
             let model = self.model();
-            let at = model.records.binary_search_by_key(&number, |entry| entry.seq()).ok()?;
-            Arc::clone(&model.records[at])
+            let at = model.records.binary_search_by_key(&number, |entry| entry.seq());
+            match (at, &model.journal) {
+                (Ok(at), _) => Arc::clone(&model.records[at]),
+                (Err(_), Some(journal)) => journal.get(number)?,
+                (Err(_), None) => return None,
+            }
         };
         let record = serde_json::to_value(&entry.record).ok()?;
         let payload = entry.json().and_then(|json| serde_json::to_string_pretty(json).ok());
@@ -422,6 +458,23 @@ impl Page {
 }
 
 impl Model {
+    /// The way of the vehicle is shown from here on.
+    fn begin_trail(&mut self, change: u64) {
+        let (now, trail) = self.vehicle.touch(change);
+        *trail = Trail::default();
+        trail.goes_on(now);
+    }
+
+    /// Keeps in mind where the vehicle was at the records of all findings that are shown.
+    fn mark(&mut self) {
+        let records = self.findings.value.iter().filter_map(|finding| finding.record);
+        let marks = records.map(|record| {
+            let known = self.marks.get(&record).cloned().flatten();
+            (record, known.or_else(|| self.whereabouts.at(record).cloned()))
+        });
+        self.marks = marks.collect();
+    }
+
     fn begin_to_run(&mut self, change: u64) {
         if matches!(self.head.value.phase, Phase::Begins | Phase::ExpectsDevice) {
             self.head.touch(change).phase = Phase::Runs;
@@ -466,11 +519,15 @@ impl Model {
         }
     }
 
-    /// A finding as it is told. One of several requirements, which says why they are undecided, goes without their sentences.
+    /// A finding as it is told, with where the vehicle was when it was at fault. One of several requirements, which says why they are undecided, goes without their sentences.
     fn with_what_is_asked(&self, finding: &Finding) -> Value {
         let mut told = json!(finding);
         if let Some(asks) = self.asks.get(&finding.requirement) {
             told["asks"] = shown(asks, SENTENCE).into();
+        }
+        let spot = finding.record.and_then(|record| self.marks.get(&record)?.as_ref());
+        if let Some(spot) = spot.filter(|_| matches!(finding.verdict, Verdict::Fail | Verdict::Warning)) {
+            told["spot"] = json!(spot);
         }
         told
     }

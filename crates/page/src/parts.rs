@@ -75,6 +75,9 @@ pub(crate) struct Step {
 #[derive(Debug, Serialize)]
 pub(crate) struct Asked {
     pub number: u64,
+    /// How many questions the plan has, where it knows them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub of: Option<u64>,
     pub test: Option<String>,
     pub title: Option<String>,
     pub why: Option<String>,

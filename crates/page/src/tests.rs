@@ -12,6 +12,7 @@ use super::*;
 use tck_base::clock::{Moment, Stamp};
 use tck_base::verdict::Verdict;
 use tck_journal::event::{Direction, Event, Record, Source};
+use tck_journal::file::JournalWriter;
 use tck_journal::{Entry, Payload};
 
 /// Writes down what was pressed; only question 1 is open.
@@ -481,4 +482,122 @@ async fn what_a_device_says_is_bounded_and_harmless() {
             "{none}"
         );
     }
+}
+
+fn at(x: f64, map: &str) -> VehicleOnFloor {
+    VehicleOnFloor {
+        x: Some(x),
+        y: Some(0.0),
+        map: Some(map.to_owned()),
+        ..VehicleOnFloor::default()
+    }
+}
+
+/// The vehicle says in this record that it is there.
+fn drives(page: &Page, record: u64, x: f64) {
+    page.saw(&message(record, "{}"), TOPIC);
+    page.vehicle(at(x, "hall"));
+}
+
+#[tokio::test]
+async fn a_finding_is_marked_where_the_vehicle_was_and_the_way_begins_anew_with_each_test() {
+    let (page, _, server) = served().await;
+    let mut browser = Browser::open(&server, "1").await;
+    page.test_begun(&test_facts());
+    for record in 1..=5 {
+        drives(&page, record, record as f64);
+    }
+    let of = |record: u64, verdict: Verdict, id: &str| Finding {
+        record: Some(record),
+        ..finding(id, verdict, "wrong")
+    };
+    page.found(vec![
+        of(3, Verdict::Fail, "A-1"),
+        of(4, Verdict::Warning, "A-2"),
+        of(4, Verdict::Inconclusive, "A-3"),
+        of(0, Verdict::Fail, "A-4"),
+    ]);
+    let told = browser
+        .until(|told| told.get("findings").is_some_and(|all| all != &json!([])))
+        .await;
+    let spots = |told: &Value| {
+        let all = told["findings"].as_array().unwrap().clone();
+        let mut spots: Vec<(String, Value)> = all
+            .iter()
+            .map(|one| (one["requirement"].as_str().unwrap().to_owned(), one["spot"].clone()))
+            .collect();
+        spots.sort_by(|one, other| one.0.cmp(&other.0));
+        spots.into_iter().map(|(_, spot)| spot).collect::<Vec<Value>>()
+    };
+    let spot = |x: f64| json!({ "x": x, "y": 0.0, "map": "hall" });
+    assert_eq!(spots(&told), [spot(3.0), spot(4.0), Value::Null, Value::Null]);
+    let mut late = Browser::open(&server, "2").await;
+    let told = late.next().await.unwrap();
+    assert_eq!(
+        told["vehicle"]["trail"].as_array().unwrap().len(),
+        5,
+        "{}",
+        told["vehicle"]
+    );
+    page.test_begun(&test_facts());
+    let told = late.until(|told| told.get("vehicle").is_some()).await;
+    assert_eq!(
+        told["vehicle"]["trail"],
+        json!([[5.0, 0.0]]),
+        "it begins where the vehicle is"
+    );
+    for record in 6..=10_000 {
+        drives(&page, record, record as f64);
+    }
+    page.findings(vec![of(3, Verdict::Fail, "A-1"), of(20, Verdict::Fail, "A-5")]);
+    let told = Browser::open(&server, "3").await.next().await.unwrap();
+    assert_eq!(
+        spots(&told),
+        [spot(3.0), Value::Null],
+        "a mark stays; of what is told too late, nobody remembers where it was"
+    );
+}
+
+#[tokio::test]
+async fn a_prompt_says_which_of_those_in_the_plan_it_is() {
+    let (page, _, server) = served().await;
+    page.prompts([("a/b".to_owned(), 2), ("c/d".to_owned(), 7), ("e/f".to_owned(), 1)].into());
+    let planned = |test: &str, left_out: Option<&str>| Planned {
+        test: test.to_owned(),
+        left_out: left_out.map(str::to_owned),
+    };
+    page.planned(vec![
+        planned("a/b", None),
+        planned("c/d", Some("it does not drive")),
+        planned("e/f", None),
+        planned("g/h", None),
+    ]);
+    for (number, of) in [(1, json!(3)), (3, json!(3)), (4, Value::Null)] {
+        page.asked(&Prompt {
+            number,
+            ..prompt("Press it.")
+        });
+        let told = Browser::open(&server, "1").await.next().await.unwrap();
+        assert_eq!(told["question"]["of"], of, "question {number}");
+    }
+}
+
+#[tokio::test]
+async fn older_records_are_read_back_from_the_journal() {
+    let (page, _, server) = served().await;
+    let mut writer = JournalWriter::temporary().unwrap();
+    page.reads_back(writer.shelf());
+    for seq in 1..=1_500 {
+        let entry = message(seq, &format!("{{\"n\":{seq}}}"));
+        writer.write(&entry.record).unwrap();
+        page.saw(&entry, TOPIC);
+    }
+    for seq in [1, 400, 1_500] {
+        let (status, answer) = said(&server, "GET", &format!("/SECRET/record/{seq}"), "", "").await;
+        assert!(
+            status == 200 && answer.contains(&format!("\\\"n\\\": {seq}")),
+            "{answer}"
+        );
+    }
+    assert_eq!(said(&server, "GET", "/SECRET/record/1501", "", "").await.0, 404);
 }

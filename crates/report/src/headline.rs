@@ -244,8 +244,8 @@ pub fn reference(journal: Option<&Journal>, seq: u64) -> String {
     let Some((journal, entry)) = journal.and_then(|journal| Some((journal, journal.get(seq)?))) else {
         return format!("#{seq}");
     };
-    match headline(entry, None, journal.names()) {
-        text if text.is_empty() => format!("#{seq} {}", kind(entry)),
-        text => format!("#{seq} {} ({text})", kind(entry)),
+    match headline(&entry, None, journal.names()) {
+        text if text.is_empty() => format!("#{seq} {}", kind(&entry)),
+        text => format!("#{seq} {} ({text})", kind(&entry)),
     }
 }

@@ -30,6 +30,7 @@ pub mod known;
 pub mod latency;
 pub mod manifest;
 pub mod markdown;
+pub mod markdown_table;
 pub mod no_result;
 pub mod overview;
 pub mod package;

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::clean::{line, short};
 use super::findings::{Finding, findings};
+use super::markdown_table::{Column, cell as escaped, table};
 use super::sources::{HowDecided, Sources};
 use super::statement;
 use super::undecided;
@@ -24,29 +25,27 @@ pub fn summary(result: &RunResult, sources: &Sources, report: Option<&str>) -> S
     let mut text = format!("## {word}\n\n{}\n", escaped(&statement::statement(result)));
     let found = findings(result, sources);
     if !found.is_empty() {
-        text += "\n| Requirement | Asked | Seen | Times | By |\n|---|---|---|---:|---|\n";
-        for finding in found.iter().take(ROWS) {
-            row(finding, &mut text);
-        }
+        let columns = [
+            Column::Text("Requirement"),
+            Column::Text("Asked"),
+            Column::Text("Seen"),
+            Column::Number("Times"),
+            Column::Text("By"),
+        ];
+        text.push('\n');
+        text += &table(columns, found.iter().take(ROWS).map(row));
         more(found.len(), &mut text);
     }
     let groups = undecided::groups(result);
     if !groups.is_empty() {
-        text += "\n### To decide more\n\n| Tests | What to do |\n|---:|---|\n";
-        for group in groups.iter().take(ROWS) {
-            let _ = writeln!(text, "| {} | {} |", escaped(&group.count()), escaped(&group.advice()));
-        }
+        text += "\n### To decide more\n\n";
+        let rows = groups.iter().take(ROWS);
+        let rows = rows.map(|group| [escaped(&group.count()), escaped(&group.advice())]);
+        text += &table([Column::Number("Tests"), Column::Text("What to do")], rows);
         more(groups.len(), &mut text);
     }
-    text += "\n| What | Pass | Warning | Inconclusive | Error | Fail |\n|---|---:|---:|---:|---:|---:|\n";
-    for (name, counts) in [
-        ("Tests", statement::tests(result)),
-        ("Monitors", statement::monitors(result)),
-        ("Requirements", statement::requirements(result)),
-    ] {
-        let numbers = Verdict::ALL.map(|verdict| counts.get(Some(verdict)).to_string());
-        let _ = writeln!(text, "| {name} | {} |", numbers.join(" | "));
-    }
+    text.push('\n');
+    text += &counted(result);
     let limits = statement::limits(result);
     if !limits.is_empty() {
         text += "\n<details><summary>Limits of this statement</summary>\n\n";
@@ -112,43 +111,44 @@ pub fn requirements(sources: &Sources, version: &str, meant: impl Fn(&str) -> bo
     text
 }
 
-fn row(finding: &Finding<'_>, text: &mut String) {
+/// How often each verdict came out.
+fn counted(result: &RunResult) -> String {
+    let columns = [
+        Column::Text("What"),
+        Column::Number("Pass"),
+        Column::Number("Warning"),
+        Column::Number("Inconclusive"),
+        Column::Number("Error"),
+        Column::Number("Fail"),
+    ];
+    let rows = [
+        ("Tests", statement::tests(result)),
+        ("Monitors", statement::monitors(result)),
+        ("Requirements", statement::requirements(result)),
+    ];
+    let rows = rows.map(|(name, counts)| {
+        let [pass, warning, inconclusive, error, fail] =
+            Verdict::ALL.map(|verdict| counts.get(Some(verdict)).to_string());
+        [name.to_owned(), pass, warning, inconclusive, error, fail]
+    });
+    table(columns, rows)
+}
+
+fn row(finding: &Finding<'_>) -> [String; 5] {
     let by: Vec<&str> = finding.tests.iter().chain(&finding.monitors).copied().take(3).collect();
-    let _ = writeln!(
-        text,
-        "| **{}** {} | {} | {} | {} | {} |",
-        escaped(finding.requirement),
-        finding.verdict.word(),
+    [
+        format!("**{}** {}", escaped(finding.requirement), finding.verdict.word()),
         escaped(finding.asks.unwrap_or_default()),
         escaped(&finding.seen),
-        finding.count,
-        escaped(&by.join(", "))
-    );
+        finding.count.to_string(),
+        escaped(&by.join(", ")),
+    ]
 }
 
 fn more(all: usize, text: &mut String) {
     if all > ROWS {
         let _ = writeln!(text, "\n… and {} more in the report", all - ROWS);
     }
-}
-
-/// One line that is no markup, whatever a device wrote into it.
-pub(super) fn escaped(text: &str) -> String {
-    let line = short(&line(text), 600).into_owned();
-    let mut safe = String::with_capacity(line.len());
-    for character in line.chars() {
-        match character {
-            '&' => safe.push_str("&amp;"),
-            '<' => safe.push_str("&lt;"),
-            '>' => safe.push_str("&gt;"),
-            '\\' | '`' | '*' | '_' | '[' | ']' | '|' | '#' | '!' | '~' | '@' => {
-                safe.push('\\');
-                safe.push(character);
-            }
-            _ => safe.push(character),
-        }
-    }
-    safe
 }
 
 /// Workflow commands of GitHub: an annotation for what is wrong with the run itself, and for each of the first ten findings.

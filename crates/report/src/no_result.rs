@@ -8,7 +8,7 @@ use serde_json::json;
 use super::cases::{Case, NOT_APPLICABLE, RUN_CASE, RUN_SUITE};
 use super::clean::{block, line};
 use super::junit::{self, JunitError, Plain};
-use super::markdown::escaped;
+use super::markdown_table::cell as escaped;
 use tck_base::verdict::Verdict;
 
 /// A run without a result.

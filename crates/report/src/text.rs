@@ -142,7 +142,7 @@ pub fn decision(decision: &Decision, sources: &Sources, journal: Option<&Journal
         let lead = color.gutter().apply_to(lead);
         let _ = writeln!(text, "{lead} {name:<8} {value}");
     };
-    let find = |seq| journal.and_then(|journal| journal.get(seq)).map(AsRef::as_ref);
+    let find = |seq| journal.and_then(|journal| journal.get(seq));
     if let Some(sent) = &decision.sent {
         let message = match find(sent.seq) {
             Some(_) => reference(journal, sent.seq),
@@ -185,7 +185,7 @@ pub fn decision(decision: &Decision, sources: &Sources, journal: Option<&Journal
             }
             _ => String::new(),
         };
-        let kind = find(nearest.seq).map_or(String::new(), |entry| format!(" {}", super::headline::kind(entry)));
+        let kind = find(nearest.seq).map_or(String::new(), |entry| format!(" {}", super::headline::kind(&entry)));
         note(
             "closest",
             format!(

@@ -40,7 +40,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         if self.engine.recorder.judge().role() == Role::MasterControl {
             return self.settle_in().await;
         }
-        let begun = self.engine.recorder.journal().entries().len() as u64;
+        let begun = self.engine.recorder.journal().last_seq();
         let is_virtual = self.engine.operator.runs_on_the_link();
         let has_state = |recorder: &Recorder| {
             let states = recorder.judge().timeline().of("state");
@@ -122,7 +122,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             if until == end || self.engine.interrupted() || self.engine.recorder.flood().is_some() {
                 return Ok(false);
             }
-            let opened = self.engine.recorder.journal().entries().iter();
+            let opened = self.engine.recorder.journal().beside_messages();
             let opened = opened
                 .filter(|entry| matches!(entry.event(), Event::Opened { .. }))
                 .count();

@@ -125,7 +125,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
 
     /// Whether a mock AGV stands on a node with nothing to do, and nothing was done to it in this test.
     fn is_as_it_was(&self, vehicle: usize) -> bool {
-        let entries = self.engine.recorder.journal().entries().iter().rev();
+        let entries = self.engine.recorder.journal().beside_messages().rev();
         let mut own = entries.take_while(|entry| !matches!(entry.event(), Event::TestBegun { .. }));
         let touched =
             own.any(|entry| matches!(entry.event(), Event::Vehicle { vehicle: other, .. } if *other == vehicle));

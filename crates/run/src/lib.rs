@@ -65,7 +65,7 @@ pub use live_run::{Hold, LiveRun, ProfileContext, RunError};
 pub use outputs::{OutputError, sources, write_all, write_joined, write_result};
 pub use overheard::Overheard;
 pub use person::{Answer, Person, Place, Reply, Wanted};
-pub use plan::{How, PlanLine, RunPlan, Use, Waits};
+pub use plan::{How, PlanLine, RunPlan, Use, Waits, prompts};
 pub use questions::{Board, Question};
 pub use request::{Request, RequestBuilder};
 pub use selection::{Criteria, Selection, SelectionError, matches, meant, select};

@@ -1,7 +1,7 @@
 //! Everything a bundle holds beside the journal, written from the result alone.
 
 use super::bundle::{Bundle, BundleError};
-use tck_journal::Journal;
+use tck_journal::{Journal, LostRecord};
 use tck_judge::Library;
 use tck_pack::{Decided, Pack};
 use tck_report::junit::Inconclusive;
@@ -24,6 +24,9 @@ pub enum OutputError {
     /// `report.html` cannot be made.
     #[error("cannot render the report: {0}")]
     Html(String),
+    /// The report lacks a record that is in the journal.
+    #[error(transparent)]
+    Lost(#[from] LostRecord),
     /// `manifest.json` cannot be made.
     #[error(transparent)]
     Manifest(#[from] manifest::ManifestError),
@@ -126,6 +129,9 @@ fn written(
     let by_requirement = junit::by_requirement(result, sources, flavour)?;
     bundle.write("junit-requirements.xml", by_requirement.as_bytes())?;
     let page = html::render(result, sources, journal).map_err(|error| OutputError::Html(error.to_string()))?;
+    if let Some(lost) = journal.and_then(Journal::lost) {
+        return Err(lost.clone().into());
+    }
     bundle.write("report.html", page.as_bytes())?;
     Ok(manifest::Manifest::write(bundle.folder())?.root)
 }

@@ -15,7 +15,7 @@ use super::session::Setup;
 use tck_course::Layout;
 use tck_journal::Reason;
 use tck_pack::{Hooks, Pack, Participant, Role};
-use tck_profile::HookAction;
+use tck_profile::{Hook, HookAction};
 use tck_suite::model::{Test, Verb};
 
 /// How a hook is done.
@@ -251,6 +251,17 @@ fn hooks(test: &Test) -> Vec<String> {
         _ => None,
     });
     hooks.collect()
+}
+
+/// How often a person is asked in a test, with these hooks of a profile.
+#[must_use]
+pub fn prompts(test: &Test, known: &BTreeMap<String, Hook>) -> usize {
+    let is_asked = |name: &String| {
+        known
+            .get(name)
+            .is_some_and(|hook| matches!(hook.action, HookAction::Prompt(_)))
+    };
+    hooks(test).iter().filter(|name| is_asked(name)).count()
 }
 
 /// How many edges the orders of a test release.

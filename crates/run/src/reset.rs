@@ -17,8 +17,8 @@ const STARTS: usize = 2;
 impl<L: Link, O: Operator> Session<'_, L, O> {
     /// Ends link faults that a test has left behind, and waits for the device to come back.
     pub(super) async fn settle_link(&mut self) -> Result<(), EngineError> {
-        let entries = self.engine.recorder.journal().entries();
-        let last = entries.iter().rev().find_map(|entry| match entry.event() {
+        let entries = self.engine.recorder.journal().beside_messages();
+        let last = entries.rev().find_map(|entry| match entry.event() {
             Event::Fault { fault } => Some(fault.clone()),
             _ => None,
         });
@@ -90,7 +90,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
     pub(super) fn was_started(&self) -> bool {
         let ground = self.engine.recorder.judge().ground();
         let starts = |hook: &str| ground.hooks.find(hook, ground.role).is_some_and(HookInfo::starts);
-        let entries = self.engine.recorder.journal().entries().iter().rev();
+        let entries = self.engine.recorder.journal().beside_messages().rev();
         let mut since = entries.take_while(|entry| entry.seq() >= self.ready_since);
         since.any(|entry| matches!(entry.event(), Event::Hook { hook, ok: true, .. } if starts(hook)))
     }
@@ -192,7 +192,10 @@ async fn off_and_on<L: Link, O: Operator>(session: &mut Session<'_, L, O>) -> Re
 }
 
 fn next_seq(recorder: &Recorder) -> u64 {
-    recorder.journal().entries().last().map_or(0, |entry| entry.seq() + 1)
+    match recorder.journal().last_seq() {
+        0 => 0,
+        last => last + 1,
+    }
 }
 
 fn last_sent(recorder: &Recorder) -> String {

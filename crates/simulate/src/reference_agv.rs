@@ -1,6 +1,7 @@
 //! The built-in reference AGV as a device under test: its floor, its profile, its configuration.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::{Map, Value, json};
@@ -18,14 +19,14 @@ use tck_view::Names;
 pub struct ReferenceAgv {
     /// Who it says it is.
     pub subject: Participant,
-    /// The floor.
-    pub layout: Layout,
+    /// The floor, which a whole fleet shares.
+    pub layout: Arc<Layout>,
     /// How it is configured.
     pub config: AgvConfig,
     /// Its part of the timing contract.
     pub time: TimeLimits,
     /// The actions tests may use for their own ends, and where they can be performed.
-    pub actions: SampleActions,
+    pub actions: Arc<SampleActions>,
 }
 
 /// Nodes of the built-in floor: a shelf with a load, a shelf that is taken, a lift, a charger.
@@ -209,10 +210,10 @@ impl ReferenceAgv {
         };
         Self {
             subject,
-            layout,
+            layout: Arc::new(layout),
             config,
             time,
-            actions,
+            actions: Arc::new(actions),
         }
     }
 
@@ -245,7 +246,7 @@ impl ReferenceAgv {
     }
 
     fn follow_a_line(&mut self) {
-        self.layout = self.layout.clone().with_directions();
+        self.layout = Arc::new(Layout::clone(&self.layout).with_directions());
         self.config.stops_between_nodes = false;
         // It knows no coordinates, so it has no use for a pose or a map.
         let without = ["initPosition", "downloadMap", "enableMap", "deleteMap"];
@@ -256,7 +257,7 @@ impl ReferenceAgv {
 
     /// It carries nothing, charges nowhere, and offers no action that needs a station.
     fn without_loads(&mut self) {
-        self.actions
+        Arc::make_mut(&mut self.actions)
             .0
             .retain(|name, _| matches!(*name, "long-action" | "brief-action" | "uninterruptible-action"));
         let of_stations = [
@@ -324,7 +325,7 @@ impl ReferenceAgv {
             ("uninterruptible-action", 0.2),
             ("brief-action", 0.02),
         ] {
-            if let Some(action) = self.actions.0.get_mut(name) {
+            if let Some(action) = Arc::make_mut(&mut self.actions).0.get_mut(name) {
                 action.parameters.insert("duration".to_owned(), json!(seconds));
             }
         }
@@ -349,7 +350,7 @@ impl ReferenceAgv {
         // Long enough for what a test does meanwhile.
         let seconds = 0.5 + 3.0 * (self.config.answers_after + self.config.min_state_interval).as_secs_f64();
         for name in ["long-action", "uninterruptible-action"] {
-            if let Some(action) = self.actions.0.get_mut(name) {
+            if let Some(action) = Arc::make_mut(&mut self.actions).0.get_mut(name) {
                 action.parameters.insert("duration".to_owned(), json!(seconds));
             }
         }
@@ -382,7 +383,7 @@ impl ReferenceAgv {
             enabled: true,
         });
         self.config.maps = on_board.collect();
-        self.layout = layout;
+        self.layout = Arc::new(layout);
     }
 
     /// Puts on its floor what the actions of a profile find there: loads, free places, chargers.

@@ -1,6 +1,7 @@
 //! The built-in reference master control as a device under test: its fleet, its floor, its configuration.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::{Map, Value};
@@ -26,7 +27,7 @@ pub struct ReferenceMasterControl {
     /// The mock AGVs it commands.
     pub fleet: Fleet,
     /// The floor.
-    pub layout: Layout,
+    pub layout: Arc<Layout>,
     /// How it is configured.
     pub config: MasterControlConfig,
     /// The liberties it takes beside what is configured, by name.
@@ -55,7 +56,7 @@ impl ReferenceMasterControl {
 
     /// One that commands these vehicles on this floor.
     #[must_use]
-    pub fn commanding(fleet: Fleet, layout: Layout) -> Self {
+    pub fn commanding(fleet: Fleet, layout: Arc<Layout>) -> Self {
         let vehicles = fleet.vehicles.iter().map(|vehicle| VehicleConfig {
             manufacturer: vehicle.subject.manufacturer.clone(),
             serial_number: vehicle.subject.serial_number.clone(),

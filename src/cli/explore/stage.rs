@@ -422,7 +422,7 @@ impl Stage for OnStage {
 
 /// What came of a run, and where its conversations began.
 fn round(finished: Finished) -> Round {
-    let entries = finished.recorder.journal().entries().iter();
+    let entries = finished.recorder.journal().beside_messages();
     let began = entries.filter_map(|entry| match entry.event() {
         Event::TestBegun { test, bindings, .. } => {
             let node = bindings.get("course")?.get(HERE)?.as_str()?;

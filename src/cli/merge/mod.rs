@@ -342,6 +342,9 @@ fn judged(path: &Path, library: &Library) -> Result<RunResult, Problem> {
     let Recording { journal, .. } = file::read(path).map_err(|error| wrong(error.to_string()))?;
     let result = judge::judge(&library.rules, journal.entries());
     let mut result = result.map_err(|error| wrong(format!("{}: {error}", path.display())))?;
+    if let Some(lost) = journal.lost() {
+        return Err(wrong(lost.to_string()));
+    }
     result.journal = file::name_of(path);
     Ok(result)
 }

@@ -369,6 +369,8 @@ impl Job {
         if let Some(page) = &self.page {
             let role = run.device.subject.role;
             page.asks(page::asks(&self.library.rules.catalogue, &self.pack));
+            page.prompts(page::prompts(&self.request, &self.effective.profile));
+            page.reads_back(writer.shelf());
             run.onlooker = Some(page::onlooker(page.clone(), role, Arc::clone(&self.pack)));
             if let Some(layout) = run.device.layout.as_ref().filter(|_| role == Role::Agv) {
                 page.floor(page::floor(layout));

@@ -59,23 +59,26 @@ impl Earlier {
         if torn {
             eprintln!("the last line of the journal is cut off, as after a crash; everything before it is used");
         }
-        let headers = journal.entries().iter().rev().filter_map(|entry| match entry.event() {
+        let headers = journal.beside_messages().rev().filter_map(|entry| match entry.event() {
             Event::RunBegun { header } => Some((**header).clone()),
             _ => None,
         });
         let header = headers.into_iter().next();
         let header = header.ok_or_else(|| wrong(format!("{}: there is no run in it", path.display())))?;
-        let mut plans = journal.entries().iter().filter_map(|entry| match entry.event() {
-            Event::Planned { plan } => Some(plan),
+        let mut plans = journal.beside_messages().filter_map(|entry| match entry.event() {
+            Event::Planned { plan } => Some((plan.complete, plan.repeat.unwrap_or(1))),
             _ => None,
         });
-        let Some(plan) = plans.next() else {
+        let Some((complete, repeat)) = plans.next() else {
             let title = format!("{}: the run broke off before it had a plan", folder.display());
             return Err(Diagnostic::whole("resume", title).hint("run it anew").into());
         };
-        let (complete, repeat) = (plan.complete, plan.repeat.unwrap_or(1));
+        drop(plans);
         let judged = judge::judged(&library.rules, journal.entries());
         let judged = judged.map_err(|error| wrong(format!("{}: {error}", folder.display())))?;
+        if let Some(lost) = journal.lost() {
+            return Err(wrong(lost.to_string()));
+        }
         let result = judged.result();
         if !result.partial && !result.ran_out_of_time() {
             let why = format!("the run in {} came to its end: nothing is left of it", folder.display());

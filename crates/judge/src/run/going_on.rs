@@ -1,5 +1,6 @@
 //! A run that goes on with one that broke off, and whole journals, in which there may be several runs.
 
+use std::borrow::Borrow;
 use std::sync::Arc;
 
 use serde_json::Value;
@@ -103,7 +104,10 @@ impl RunJudge {
 ///
 /// # Errors
 /// When it is none of a run that these suites can judge.
-pub fn judge(rules: &Rules, entries: &[Arc<Entry>]) -> Result<RunResult, JudgeError> {
+pub fn judge<E: Borrow<Arc<Entry>>>(
+    rules: &Rules,
+    entries: impl IntoIterator<Item = E>,
+) -> Result<RunResult, JudgeError> {
     Ok(judged(rules, entries)?.result())
 }
 
@@ -111,11 +115,18 @@ pub fn judge(rules: &Rules, entries: &[Arc<Entry>]) -> Result<RunResult, JudgeEr
 ///
 /// # Errors
 /// When it is none of a run that these suites can judge.
-pub fn judged(rules: &Rules, entries: &[Arc<Entry>]) -> Result<RunJudge, JudgeError> {
-    let first = entries.first().ok_or(JudgeError::NoHeader)?;
+pub fn judged<E: Borrow<Arc<Entry>>>(
+    rules: &Rules,
+    entries: impl IntoIterator<Item = E>,
+) -> Result<RunJudge, JudgeError> {
+    let mut entries = entries.into_iter();
+    let first = entries.next().ok_or(JudgeError::NoHeader)?;
+    let first = first.borrow();
     let mut run = RunJudge::begin(rules, first)?;
+    run.observe(first)?;
     for entry in entries {
-        if entry.seq() != first.seq() && matches!(entry.event(), Event::RunBegun { .. }) {
+        let entry = entry.borrow();
+        if matches!(entry.event(), Event::RunBegun { .. }) {
             run = run.resumed(entry)?;
         }
         run.observe(entry)?;

@@ -15,6 +15,8 @@ use tck_base::device::Publication;
 
 use super::difference::Difference;
 
+/// How long a client may wait to be let in: a broker may be busy with the thousands of a fleet that begins.
+const ENTRY: Duration = Duration::from_secs(30);
 /// How long each message may take.
 const LIMIT: Duration = Duration::from_secs(5);
 /// How long what is stored may come after what was published behind the subscription.
@@ -269,7 +271,7 @@ impl<'a> Tester<'a> {
             early: VecDeque::new(),
         };
         loop {
-            match timeout(LIMIT, tester.events.recv()).await {
+            match timeout(ENTRY, tester.events.recv()).await {
                 Ok(Some(ClientEvent::Connected)) => return Ok(tester),
                 // A stored message may come before the acknowledgement.
                 Ok(Some(ClientEvent::Message {

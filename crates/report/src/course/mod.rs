@@ -12,29 +12,28 @@ mod route;
 pub use driven::{Bounds, Driven, Finding};
 pub use picture::{CoursePicture, Found, Stop, Stretch};
 
+use std::sync::Arc;
+
 use tck_journal::{Entry, Event, Journal, Packet};
 use tck_view::Topic;
 
 /// The picture of a part of a journal, with where the vehicle was at these findings, the worst first. It shows the vehicle that the
 /// first one is about. `None` where no vehicle moved.
 #[must_use]
-pub fn in_window(journal: &Journal, (first, last): (u64, u64), findings: &[Finding]) -> Option<CoursePicture> {
-    let entries = journal.entries();
-    let from = entries.partition_point(|entry| entry.seq() < first);
-    let to = entries.partition_point(|entry| entry.seq() <= last);
-    let entries = entries.get(from..to)?;
+pub fn in_window(journal: &Journal, window: (u64, u64), findings: &[Finding]) -> Option<CoursePicture> {
+    let entries = journal.entries().within(window);
+    let of = |entry: &Entry| address(entry).map(|(of, _)| of.to_owned());
     let accused = findings.first().and_then(|finding| journal.get(finding.number));
-    let stated = |entry: &&std::sync::Arc<Entry>| address(entry).is_some_and(|(_, name)| name == "state");
-    let accused = accused.and_then(|entry| address(entry));
-    let vehicle = accused.or_else(|| entries.iter().find(stated).and_then(|entry| address(entry)));
-    let (vehicle, _) = vehicle?;
+    let accused = accused.and_then(|entry| of(&entry));
+    let stated = |entry: &Arc<Entry>| address(entry).is_some_and(|(_, name)| name == "state");
+    let vehicle = accused.or_else(|| entries.iter().find(stated).and_then(|entry| of(&entry)))?;
     let mut driven = Driven::new(Bounds::TEST).watching(findings.iter().map(|finding| finding.number));
     for entry in entries {
         // What the tap saw of it is the same message once more.
         if !matches!(entry.event(), Event::Message { .. } | Event::Sent { .. }) {
             continue;
         }
-        let name = address(entry).filter(|(of, _)| *of == vehicle).map(|(_, name)| name);
+        let name = address(&entry).filter(|(of, _)| *of == vehicle).map(|(_, name)| name);
         let message = name.and_then(|name| entry.view(Topic::of_name(name), journal.names()));
         if let Some(message) = message {
             driven.note(entry.seq(), message);

@@ -63,16 +63,19 @@ pub fn choose(test: &TestResult, gallery: &mut Gallery<'_>) -> Option<String> {
     let of_findings = test.findings().filter_map(|finding| finding.sent.as_ref());
     wanted.extend(of_findings.map(|sent| (sent.seq, "stimulus")));
     let (first, last) = test.journal?;
-    let all: Vec<_> = journal
-        .entries()
-        .iter()
-        .filter(|entry| (first..=last).contains(&entry.seq()))
-        .collect();
-    let sent: Vec<u64> = all
-        .iter()
-        .filter(|entry| matches!(entry.event(), Event::Sent { .. } | Event::Fault { .. }))
-        .map(|entry| entry.seq())
-        .collect();
+    let (mut sent, mut recorded) = (Vec::new(), Vec::new());
+    for entry in journal.entries().within((first, last)) {
+        if matches!(entry.event(), Event::Sent { .. } | Event::Fault { .. }) {
+            sent.push(entry.seq());
+        }
+        // What the tap saw of them is the same messages once more.
+        if matches!(
+            entry.event(),
+            Event::Message { .. } | Event::Sent { .. } | Event::Retained { .. }
+        ) {
+            recorded.push(entry.seq());
+        }
+    }
     if centres.is_empty() {
         centres.insert(last);
     }
@@ -96,16 +99,8 @@ pub fn choose(test: &TestResult, gallery: &mut Gallery<'_>) -> Option<String> {
             asked.insert(seq);
         }
     }
-    // What the tap saw of them is the same messages once more.
-    let seen_once = |event: &Event| {
-        matches!(
-            event,
-            Event::Message { .. } | Event::Sent { .. } | Event::Retained { .. }
-        )
-    };
-    let recorded = || all.iter().filter(|entry| seen_once(entry.event()));
-    let messages = recorded().count();
-    let shown = recorded().filter(|entry| gallery.shows(entry.seq())).count();
+    let messages = recorded.len();
+    let shown = recorded.iter().filter(|seq| gallery.shows(**seq)).count();
     (shown < messages).then(|| {
         format!(
             "{shown} of the {} recorded during this test; the journal has all of them.",

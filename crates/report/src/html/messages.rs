@@ -85,7 +85,7 @@ impl<'a> Gallery<'a> {
             return false;
         };
         self.shown.insert(seq);
-        let message = view(entry, journal.names(), role, places);
+        let message = view(&entry, journal.names(), role, places);
         self.bytes += message
             .lines
             .iter()

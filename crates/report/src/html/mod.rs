@@ -150,7 +150,7 @@ fn explored(result: &RunResult) -> Vec<(&'static str, Grid)> {
 /// The command line as recorded in the journal.
 fn command(journal: &Journal) -> String {
     let first = journal.entries().first();
-    match first.map(|entry| entry.event()) {
+    match first.as_ref().map(|entry| entry.event()) {
         Some(Event::RunBegun { header }) => header.command.join(" "),
         _ => String::new(),
     }

@@ -1,6 +1,8 @@
 //! What each record of a journal window looks like as a row of the diagram. Leaving rows out is left to
 //! [`super::thin`].
 
+use std::sync::Arc;
+
 use super::Options;
 use super::row::{Lane, Row, What};
 use super::thin::{flagged, repeats, shorten, twins};
@@ -17,25 +19,19 @@ pub struct Found {
     pub probes: usize,
 }
 
-pub fn collect(journal: &Journal, (first, last): (u64, u64), options: &Options<'_>) -> Found {
-    let entries = journal.entries();
-    let from = entries.partition_point(|entry| entry.seq() < first);
-    let to = entries.partition_point(|entry| entry.seq() <= last);
-    let entries = &entries[from..to.max(from)];
+pub fn collect(journal: &Journal, window: (u64, u64), options: &Options<'_>) -> Found {
+    let entries = journal.entries().within(window);
     let start = entries.first().map(|entry| entry.at().moment);
-    let tap = journal
-        .entries()
-        .iter()
-        .any(|entry| matches!(entry.event(), Event::Packet { .. } | Event::Opened { .. }));
-    let twins = twins(entries);
+    let tap = journal.has_tap();
+    let twins = twins(journal, window);
     let mut found = Found {
         drawn: Vec::new(),
         acknowledgements: 0,
         probes: 0,
     };
     let names = journal.names();
-    let mut before: Option<&StateView> = None;
-    for (at, entry) in entries.iter().enumerate() {
+    let mut before: Option<Arc<StateView>> = None;
+    for entry in entries {
         match entry.event() {
             Event::ProbeSent { .. } | Event::ProbeReceived { .. } => found.probes += 1,
             Event::Packet {
@@ -44,16 +40,16 @@ pub fn collect(journal: &Journal, (first, last): (u64, u64), options: &Options<'
             } => found.acknowledgements += 1,
             _ => {}
         }
-        if twins.hidden.contains(&at) || flagged(&mut found.drawn, entry) {
+        if twins.hidden.contains(&entry.seq()) || flagged(&mut found.drawn, &entry) {
             continue;
         }
-        let around = (before, names);
-        let Some(mut row) = row(entry, twins.seen.contains(&at), tap, around, options) else {
+        let around = (before.as_deref(), names);
+        let Some(mut row) = row(&entry, twins.seen.contains(&entry.seq()), tap, around, options) else {
             continue;
         };
         row.time = start.map(|start| (entry.at().moment - start).as_secs_f64());
-        if let Some(MessageView::State(state)) = headline::view(entry, names) {
-            before = Some(state);
+        if let Some(MessageView::State(state)) = headline::view(&entry, names) {
+            before = Some(Arc::clone(state));
         }
         if !repeats(&mut found.drawn, &row, options) {
             found.drawn.push(row);

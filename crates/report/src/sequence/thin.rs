@@ -4,28 +4,33 @@
 //! say nothing new are counted, not drawn again. When there are too many rows, those next to the marked
 //! records stay.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::Arc;
 
 use super::Options;
 use super::row::{Row, What};
 use crate::clean::line;
 use crate::statement::many;
-use tck_journal::{Direction, Entry, Event, Packet};
+use tck_journal::{Direction, Entry, Event, Journal, Packet};
 
 /// How many records apart the two sightings of one message may be.
 const TWIN_DISTANCE: usize = 12;
 
 /// Which records are second sightings of a message, and which first sightings have one.
 pub struct Twins {
-    pub hidden: BTreeSet<usize>,
-    pub seen: BTreeSet<usize>,
+    pub hidden: BTreeSet<u64>,
+    pub seen: BTreeSet<u64>,
 }
 
-pub fn twins(entries: &[std::sync::Arc<Entry>]) -> Twins {
+/// The twins among records, by their numbers.
+pub fn twins(journal: &Journal, window: (u64, u64)) -> Twins {
     let mut twins = Twins {
         hidden: BTreeSet::new(),
         seen: BTreeSet::new(),
     };
+    if !journal.has_tap() {
+        return twins;
+    }
     let tap = |entry: &Entry, way: Direction| {
         matches!(
             entry.event(),
@@ -36,19 +41,32 @@ pub fn twins(entries: &[std::sync::Arc<Entry>]) -> Twins {
         ) && entry.record.direction == Some(way)
     };
     let same = |a: &Entry, b: &Entry| full_topic(a) == full_topic(b) && a.payload() == b.payload();
-    for (at, entry) in entries.iter().enumerate() {
+    let mut ahead = journal.entries().within(window).iter();
+    // The record that is looked at, and those around it.
+    let mut next: VecDeque<Arc<Entry>> = ahead.by_ref().take(TWIN_DISTANCE + 1).collect();
+    let mut before: VecDeque<Arc<Entry>> = VecDeque::new();
+    while let Some(entry) = next.pop_front() {
         let twin = match entry.event() {
-            Event::Message { .. } => (at.saturating_sub(TWIN_DISTANCE)..at)
-                .rev()
-                .find(|other| tap(&entries[*other], Direction::FromDevice) && same(entry, &entries[*other])),
-            Event::Sent { .. } => (at + 1..entries.len().min(at + TWIN_DISTANCE + 1))
-                .find(|other| tap(&entries[*other], Direction::ToDevice) && same(entry, &entries[*other])),
+            Event::Message { .. } => {
+                let mut before = before.iter().rev();
+                before.find(|other| tap(other, Direction::FromDevice) && same(&entry, other))
+            }
+            Event::Sent { .. } => {
+                let mut next = next.iter();
+                next.find(|other| tap(other, Direction::ToDevice) && same(&entry, other))
+            }
             _ => None,
         };
+        let twin = twin.map(|twin| twin.seq());
         if let Some(twin) = twin.filter(|twin| !twins.hidden.contains(twin)) {
             twins.hidden.insert(twin);
-            twins.seen.insert(at);
+            twins.seen.insert(entry.seq());
         }
+        if before.len() == TWIN_DISTANCE {
+            before.pop_front();
+        }
+        before.push_back(entry);
+        next.extend(ahead.next());
     }
     twins
 }

@@ -10,7 +10,7 @@ use crate::bench::tls::TlsFiles;
 use tck_base::clock::WallClock;
 
 /// How long the broker may take to accept the harness, or to serve a fresh subscriber.
-pub(super) const ANSWER_LIMIT: Duration = Duration::from_secs(10);
+pub(super) const ANSWER_LIMIT: Duration = Duration::from_secs(30);
 
 /// Which broker is used.
 #[derive(Clone, Debug)]
