@@ -202,7 +202,7 @@ fn the_journal_of_a_run_is_audited_like_the_run_was_judged() {
         (Role::Agv, &["header-id-constant", "horizon-not-reported"][..]),
         (Role::MasterControl, &["other-serial-number"][..]),
     ] {
-        let faultless = library.rules.packs.of_devices().map(|pack| (pack, None));
+        let faultless = library.rules.packs.of_role(role).map(|pack| (pack, None));
         let faulty = faults.iter().map(|fault| (library.rules.packs.latest(), Some(*fault)));
         let mut found = 0;
         for (pack, fault) in faultless.chain(faulty) {

@@ -40,7 +40,6 @@ mod qualified;
 mod qualify;
 mod recordings;
 mod reference;
-mod rejudged;
 mod report;
 mod result_bundle;
 mod run;

@@ -48,7 +48,7 @@ pub fn qualify(arguments: &Qualify) -> Result<Exit, Problem> {
     // Of a version that knows one side only the other one is left out, unless it is the one that is asked for.
     let judged = |role: Role| match arguments.protocol.as_deref() {
         Some(wanted) => super::pack_for_devices(known, Some(wanted), role).map(|pack| vec![pack]),
-        None => Ok(known.of_devices().cloned().collect()),
+        None => Ok(known.of_role(role).cloned().collect()),
     };
     let mut sides_of = Vec::new();
     for role in &with_faults {

@@ -1,4 +1,4 @@
-//! A version of which messages and one side can be judged: it is known everywhere, and the other side is refused.
+//! A version that devices are judged by as far as its tests go: messages, both sides, what changed on the way to it.
 
 use std::fs;
 
@@ -150,31 +150,17 @@ fn a_recording_is_judged_message_by_message() {
 }
 
 #[test]
-fn a_side_that_is_not_judged_by_it_yet_is_refused_with_a_sentence() {
+fn the_reference_fleet_control_passes_what_its_tests_decide() {
     let bench = Bench::new();
-    let sentence = "of protocol version 3.0.0 no master-control can be judged";
-    for command in [
-        &["run", "--virtual", "--role", "master-control"][..],
-        &["run", "--virtual", "--plan", "--role", "master-control"],
-        &["qualify", "--role", "master-control"],
-        &["simulate", "master-control"],
-    ] {
-        let words: Vec<&str> = command.iter().copied().chain(["--protocol", VERSION]).collect();
-        run_in(bench.path(), &words).code(2).says(sentence).says("2.1.0");
-    }
-    run(&["list", "tests", "--role", "master-control", "--protocol", VERSION])
-        .code(4)
-        .says(sentence);
-    run_in(bench.path(), &["explore", "--virtual", "--protocol", VERSION])
-        .code(2)
-        .says("no stimuli");
-    let profile =
-        "[device]\nrole = \"master-control\"\nmanufacturer = \"A\"\nserial-number = \"1\"\nprotocol = \"3.0.0\"\n";
-    fs::write(bench.path().join("device.toml"), profile).unwrap();
-    run_in(bench.path(), &["run", "--profile", "device.toml"])
-        .code(2)
-        .says(sentence)
-        .says("device.toml");
+    let fleet = ["--protocol", VERSION, "--role", "master-control"];
+    let words = |command: &[&'static str], test: &'static str| -> Vec<&'static str> {
+        let command: Vec<&str> = command.to_vec();
+        command.into_iter().chain(fleet).chain([test]).collect()
+    };
+    run_in(bench.path(), &words(&["run", "--virtual"], "dispatch/one-edge")).code(0);
+    let faulty = ["run", "--virtual", "--fault", "instant-action-blocks-all"];
+    let ended = run_in(bench.path(), &words(&faulty, "cancel/instant-action")).code(1);
+    assert!(ended.stdout.contains("IACT-08"), "{}", ended.stdout);
 }
 
 #[test]

@@ -108,8 +108,8 @@ const QUIET: [(Role, &str); 5] = [
 fn who_did_nothing_wrong_is_accused_of_nothing_however_bad_the_recording() {
     let library = tck_testing::library();
     let mut wrong = BTreeSet::new();
-    for pack in library.rules.packs.of_devices() {
-        for (role, tests) in QUIET {
+    for (role, tests) in QUIET {
+        for pack in library.rules.packs.of_role(role) {
             let whole = traffic(library, pack, role, tests, &[]);
             let judged = audited(library, whole.clone());
             wrong.extend(found(&judged, role));

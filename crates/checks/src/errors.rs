@@ -15,8 +15,8 @@ const ACTIONS: usize = 256;
 /// The report of a rejected order stays until a new order is accepted.
 pub(super) const PERSIST: Check = Check {
     name: "errors/persist-until-new-order",
-    decides: &["ORD-REJ-03", "ORD-REJ-08"],
-    doc: "A validationError or orderError warning that answers an order is listed in every state until the vehicle \
+    decides: &["ORD-REJ-03", "ORD-REJ-08", "ORD-REJ-19"],
+    doc: "A validationError or orderError warning that answers an order, and an UNSUPPORTED_PARAMETER error, is listed in every state until the vehicle \
           shows another orderId or orderUpdateId. Errors that answer an instant action are not held to this, and a \
           restart or a change of operating mode ends the watch; a cut of the link by the harness does not, as long as the \
           vehicle counts its headerId on.",
@@ -28,6 +28,8 @@ pub(super) const PERSIST: Check = Check {
         Listen::Answer,
         Listen::ToVehicle(Topic::InstantActions),
         Listen::ToVehicle(Topic::Order),
+        Listen::ToVehicle(Topic::Responses),
+        Listen::ToVehicle(Topic::ZoneSet),
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
@@ -55,7 +57,8 @@ pub(super) fn requirement(error_type: &str) -> Option<(&'static str, &'static st
     // One check for all versions: later ones spell these in capitals.
     match error_type {
         "validationError" | "VALIDATION_FAILURE" => Some(("validation", "ORD-REJ-03")),
-        "orderError" | "INVALID_ORDER_ACTION" | "UNSUPPORTED_PARAMETER" => Some(("order", "ORD-REJ-08")),
+        "orderError" | "INVALID_ORDER_ACTION" => Some(("order", "ORD-REJ-08")),
+        "UNSUPPORTED_PARAMETER" => Some(("parameter", "ORD-REJ-19")),
         _ => None,
     }
 }
@@ -107,10 +110,10 @@ impl Running for Persist {
             .collect();
         for (kind, since) in gone {
             self.watched.remove(kind);
-            let (name, id) = if kind == "order" {
-                ("orderError", "ORD-REJ-08")
-            } else {
-                ("validationError", "ORD-REJ-03")
+            let (name, id) = match kind {
+                "order" => ("orderError", "ORD-REJ-08"),
+                "parameter" => ("UNSUPPORTED_PARAMETER error", "ORD-REJ-19"),
+                _ => ("validationError", "ORD-REJ-03"),
             };
             let text = format!("the {name} of message #{since} is gone, although no new order was accepted");
             findings.push(broken(id, record.seq(), text));
@@ -134,7 +137,10 @@ impl Persist {
         if record.is_to_vehicle(Topic::Order) {
             // Right after an instant action nobody knows which of the two an error answers.
             self.after_order = !self.instant_pending;
-        } else if record.is_to_vehicle(Topic::InstantActions) {
+        } else if [Topic::InstantActions, Topic::Responses, Topic::ZoneSet]
+            .iter()
+            .any(|topic| record.is_to_vehicle(*topic))
+        {
             self.after_order = false;
             self.instant_pending = true;
         }

@@ -22,7 +22,7 @@ pub(super) const ANSWERED: Check = Check {
     doc: "Each action of an instantActions message that obeys the schema is in actionStates within time.react, as long as \
           no new order is accepted. A vehicle whose error says that it lacks the list under the name of version 1.1 is told so \
           at once. Not judged while the harness disturbs the link, nor over a restart, nor with more than eight actions in \
-          one message.",
+          one message. What is sent to a vehicle that says that it hibernates is not judged.",
     arguments: &[],
     listens: &[
         Listen::Connect,
@@ -126,6 +126,8 @@ struct Answered {
     /// By actionId.
     asked: BTreeMap<String, Asked>,
     order: Option<(String, u64)>,
+    /// It says that it hibernates, and so hears nothing.
+    asleep: bool,
     /// actionTypes that the factsheet offers as instant actions.
     offered: Vec<String>,
 }
@@ -170,7 +172,14 @@ impl Answered {
                 .filter(|action| action.action_scopes.texts().any(|scope| scope == "INSTANT"));
             self.offered = instant.map(|action| action.action_type.or_empty().to_owned()).collect();
         }
-        let Some(message) = context.world.instant().well_formed(record) else {
+        if let Some(said) = record
+            .connection_message()
+            .filter(|_| record.is_delivered(Topic::Connection))
+        {
+            self.asleep = said.is_hibernating();
+        }
+        let heard = context.world.instant().well_formed(record).filter(|_| !self.asleep);
+        let Some(message) = heard else {
             return;
         };
         let all: Vec<&ActionView> = message.all_actions().collect();
@@ -184,6 +193,10 @@ impl Answered {
         }
         if self.asked.len() > ACTIONS {
             self.asked.clear();
+        }
+        // What has ended may be cleared before a state shows it.
+        if all.iter().any(|action| action.action_type.is("clearInstantActions")) {
+            self.asked.retain(|_, asked| asked.listed);
         }
         for action in &all {
             let asked = Asked {
@@ -369,7 +382,7 @@ impl Running for Answered {
     ) -> bool {
         self.learn(record, context);
         let restarted = context.world.restarts().now(record);
-        if restarted || record.link.disturbed || record.outside_influence() {
+        if restarted || record.link.disturbed || record.outside_influence() || self.asleep {
             self.asked.clear();
         }
         let Some(state) = record.state() else {

@@ -20,6 +20,7 @@ mod errors_blame;
 mod errors_event;
 mod errors_explained;
 mod errors_lingering;
+mod errors_predefined;
 mod errors_ready;
 mod factsheet;
 mod factsheet_actions;
@@ -44,6 +45,7 @@ mod motion_signs;
 mod mqtt;
 #[cfg(test)]
 mod names;
+mod paths;
 mod rhythm;
 mod state;
 mod topic;
@@ -53,6 +55,8 @@ mod trace;
 mod trajectory;
 mod visualization;
 mod visualization_pose;
+mod visualization_state;
+mod zones;
 
 use tck_check::Check;
 
@@ -117,6 +121,9 @@ pub static REGISTRY: &[Check] = &[
     trajectory::TRAJECTORY,
     trajectory::TRAJECTORY_ENDS,
     trajectory::PLANNED_PATH,
+    paths::SHARED,
+    paths::PATHS,
+    paths::OWN,
     state::battery::LEVELS,
     state::battery::PERCENT,
     state::loads::LOADS,
@@ -124,12 +131,15 @@ pub static REGISTRY: &[Check] = &[
     visualization::RATE,
     visualization::PUBLISHED,
     visualization_pose::POSITION,
+    visualization_state::NAMES_ITS_STATE,
     errors::PERSIST,
     errors_lingering::GONE,
     errors_ready::READY,
     errors_event::ON_EVENT,
     errors_blame::BLAME,
     errors_explained::EXPLAINS,
+    errors_predefined::PREDEFINED,
+    errors_predefined::STAY,
     factsheet::CONSISTENCY,
     factsheet::LIMITS,
     factsheet_actions::PREDEFINED,
@@ -143,17 +153,35 @@ pub static REGISTRY: &[Check] = &[
     motion::CORRIDOR,
     motion::CORRIDOR_POINT,
     motion::NEXT_CORRIDOR,
+    motion::CORRIDOR_ASKED,
+    motion::CORRIDOR_GRANTED,
+    motion::CORRIDOR_SHOWN,
+    motion::CORRIDOR_KEPT,
+    motion::CORRIDOR_LEASE,
+    motion::CORRIDOR_RETURNED,
+    state::requests::REQUEST_IDS,
+    state::requests::REQUEST_STATUS,
+    state::requests::EDGE_REQUESTS,
     motion::NODE_TOLERANCE,
     motion::NODE_THETA,
     motion::AXES,
     motion::VELOCITY_SIGN,
     motion_signs::VELOCITY_AXES,
+    zones::BLOCKED,
+    zones::SPEED,
+    zones::LINE_GUIDED,
+    zones::DIRECTED,
+    zones::ZONE_SETS,
+    zones::ZONE_ACTIONS,
     motion_signs::TURN_SIGN,
     motion::MODE_SPEED,
     commands::NODES_AND_EDGES,
     commands::RELEASED,
     commands::EDGE_ENDS,
     commands::SEQUENCE,
+    commands::BEGINS,
+    commands::RETRIES,
+    commands::OMNI_ONLY,
     commands::ARRAYS,
     commands::POSITION,
     commands::POSITION_RANGE,
@@ -196,6 +224,14 @@ pub static REGISTRY: &[Check] = &[
     commands::LISTENS,
     commands::AWAY,
     commands::CONTRADICTS,
+    commands::ZONES,
+    commands::ZONE_SET_IDS,
+    commands::ZONE_SET_LIMITS,
+    commands::ZONE_SET_ENABLED,
+    commands::LINE_GUIDED,
+    commands::RESPONSES,
+    commands::CORRIDOR_GRANTS,
+    commands::UNREACHABLE,
 ];
 
 #[cfg(test)]

@@ -32,6 +32,8 @@ pub(super) struct Trace {
     /// The serial number of the vehicle in its topics.
     pub serial: String,
     role: Role,
+    /// The protocol version, if it is not that of the other traces.
+    version: Option<&'static str>,
 }
 
 /// What came out: requirement, verdict and message of each finding, and whether anything was judged.
@@ -77,6 +79,30 @@ impl Trace {
         Self::new("subscriber", Role::MasterControl)
     }
 
+    /// A run with a master control under test that speaks this version, seen by a subscriber.
+    pub fn master_control_of(version: &'static str) -> Self {
+        let mut trace = Self::master_control();
+        trace.version = Some(version);
+        trace.prefix = format!("vda5050/v{}/acme/7", trace.pack().version.major);
+        trace
+    }
+
+    /// A run of this version, seen by a subscriber.
+    pub fn subscriber_of(version: &'static str) -> Self {
+        let mut trace = Self::subscriber();
+        trace.version = Some(version);
+        trace.prefix = format!("vda5050/v{}/acme/7", trace.pack().version.major);
+        trace
+    }
+
+    /// The protocol version of the trace.
+    fn pack(&self) -> Arc<Pack> {
+        match self.version {
+            Some(version) => Arc::clone(PACKS.get(version).unwrap()),
+            None => pack(),
+        }
+    }
+
     /// A run with a master control under test, seen at the tap.
     pub fn master_control_at_tap() -> Self {
         Self::new("tap", Role::MasterControl)
@@ -100,6 +126,7 @@ impl Trace {
             prefix: format!("uagv/v{}/acme/7", pack().version.major),
             serial: "7".to_owned(),
             role,
+            version: None,
         };
         let header = RunHeader {
             vantage: vantage.to_owned(),
@@ -158,7 +185,7 @@ impl Trace {
         json!({
             "headerId": self.next_header,
             "timestamp": self.at.utc.strftime("%Y-%m-%dT%H:%M:%S.%2fZ").to_string(),
-            "version": format!("{}.{}.0", pack().version.major, pack().version.minor),
+            "version": format!("{}.{}.0", self.pack().version.major, self.pack().version.minor),
             "manufacturer": "acme",
             "serialNumber": "7",
         })
@@ -216,6 +243,14 @@ impl Trace {
     pub fn commands(&mut self, name: &str, message: &Value) -> &mut Self {
         let message = merged(self.header(), message);
         self.message(name, &message)
+    }
+
+    /// The master control sends something to another vehicle.
+    pub fn other_is_commanded(&mut self, name: &str, message: &Value) -> &mut Self {
+        let own = std::mem::replace(&mut self.prefix, "vda5050/v3/acme/8".to_owned());
+        self.commands(name, message);
+        self.prefix = own;
+        self
     }
 
     /// The harness does something to its mock vehicle.
@@ -345,18 +380,9 @@ impl Trace {
 
     /// Runs a check over everything recorded.
     pub fn judge(&self, name: &str) -> Outcome {
-        let pack = pack();
-        let topics: BTreeMap<String, String> = [
-            "order",
-            "instantActions",
-            "state",
-            "visualization",
-            "connection",
-            "factsheet",
-        ]
-        .into_iter()
-        .map(|name| (name.to_owned(), self.topic(name)))
-        .collect();
+        let pack = self.pack();
+        let names = pack.topics().iter().map(|topic| topic.name.to_string());
+        let topics: BTreeMap<String, String> = names.map(|name| (name.clone(), self.topic(&name))).collect();
         let Value::Object(bindings) =
             json!({ "time": { "react": 31_000, "statePeriod": 31_000, "slow": 5_000, "notice": 1_000, "settle": 0 } })
         else {
@@ -431,9 +457,10 @@ impl Trace {
 
 static HOOKS: LazyLock<Hooks> = LazyLock::new(|| Hooks::load(&Assets::of_source_tree().unwrap()).unwrap());
 
-/// The protocol version the checks are tested with.
+static PACKS: LazyLock<Packs> = LazyLock::new(|| Packs::load(&Assets::of_source_tree().unwrap()).unwrap());
+
+/// The protocol version that most checks are tested with.
 pub(super) fn pack() -> Arc<Pack> {
-    static PACKS: LazyLock<Packs> = LazyLock::new(|| Packs::load(&Assets::of_source_tree().unwrap()).unwrap());
     Arc::clone(PACKS.latest())
 }
 

@@ -15,7 +15,7 @@ use tck_base::clock::Stamp;
 use tck_base::device::Publication;
 use tck_base::pattern::Bindings;
 use tck_judge::Ground;
-use tck_suite::model::{Patch, Raw, Send, SendAction};
+use tck_suite::model::{Patch, Raw, Send, SendAction, later};
 use tck_view::{FactsheetView, OfferedAction, OrderView, Topic};
 
 /// A finished message and the actionIds in it, by the names given with `as`.
@@ -96,6 +96,15 @@ impl Composer {
             .get(&send.topic)
             .cloned()
             .ok_or_else(|| ComposeError::Topic(send.topic.clone()))?;
+        let times = times_to_come(send, ground.pack.timestamp_digits(), now);
+        let mut timed = Bindings::new();
+        let bindings = if times.is_empty() {
+            bindings
+        } else {
+            timed.clone_from(bindings);
+            timed.extend(&times);
+            &timed
+        };
         self.factsheet = ground.factsheet();
         self.ids = IdForm::of(self.factsheet.as_ref().and_then(|sheet| sheet.string_limits()));
         let rule = ground.pack.topic(&send.topic);
@@ -353,6 +362,26 @@ fn operate(message: &mut Value, operation: Value) -> Result<(), ComposeError> {
 /// ISO 8601 in UTC with so many fraction digits (HDR-03).
 fn timestamp(now: Stamp, digits: usize) -> String {
     format!("{:.digits$}", now.utc)
+}
+
+/// The times that a message names by how long they are ahead: `now`, and below it what stands behind the dot.
+fn times_to_come(send: &Send, digits: usize, now: Stamp) -> Map<String, Value> {
+    let mut times = Map::new();
+    let patch = send.patch.as_ref().map(|patch| match patch {
+        Patch::Merge(term) | Patch::Operations(term) => term,
+    });
+    for term in send.payload.iter().chain(patch) {
+        for name in term.variables() {
+            if let (Some(ahead), Some((_, rest))) = (later(name), name.split_once('.')) {
+                let then = now.at(now.moment + ahead);
+                times.insert(rest.to_owned(), json!(timestamp(then, digits)));
+            }
+        }
+    }
+    if times.is_empty() {
+        return times;
+    }
+    Map::from_iter([("now".to_owned(), Value::Object(times))])
 }
 
 /// How an action blocks where a test does not care: the usual way, or the first type its factsheet lists when the usual

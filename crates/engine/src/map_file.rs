@@ -6,12 +6,16 @@ use tck_suite::model::Serve;
 /// The map file that is served when a test names none.
 const BUILT_IN_MAP: &[u8] = b"vda5050-tck built-in map\nresolution 0.05\norigin 0 0 0\n";
 
-/// The file a test names; or else one that the device can read, another for each offer of a test as far as there are
+/// The document or the file a test names; or else one that the device can read, another for each offer of a test as far as there are
 /// several; or one of our own.
 ///
 /// # Errors
 /// When there is no such file; the text says why.
 pub(super) fn content(serve: &Serve, bindings: &Bindings, readable: &[bytes::Bytes]) -> Result<bytes::Bytes, String> {
+    if let Some(document) = &serve.json {
+        let document = document.bind(bindings).map_err(|unbound| unbound.to_string())?;
+        return Ok(document.to_string().into());
+    }
     let Some(term) = &serve.file else {
         if !readable.is_empty() {
             return Ok(readable[place(serve, bindings) % readable.len()].clone());

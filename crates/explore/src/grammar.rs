@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 use super::broken::{Breaks, family};
 use tck_base::diagnostic::Source;
 use tck_base::yaml;
-use tck_pack::{Assets, Role, VersionRange};
+use tck_pack::{Assets, Pack, Role, VersionRange};
 use tck_suite::model::BrokenMember;
 
 /// Why there is no grammar.
@@ -265,6 +265,13 @@ impl Grammar {
         };
         self.stimuli
             .retain(|other, stimulus| family(other) != family(name) || stimulus.needs != needs);
+    }
+
+    /// Whether it says how devices of a protocol version are spoken to.
+    #[must_use]
+    pub fn speaks(&self, pack: &Pack) -> bool {
+        let range = self.spec.parse::<VersionRange>();
+        range.is_ok_and(|range| range.contains(pack.version))
     }
 
     /// The side it is for, in the word of a test.

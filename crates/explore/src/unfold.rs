@@ -11,19 +11,60 @@ use tck_suite::model::BrokenMember;
 const PATCH: &str = "${break.patch}";
 
 impl Grammar {
-    /// Leaves out the stimuli that a protocol version does not have, and those `keeps` refuses. A stimulus that stands for
-    /// many breakages becomes as many.
+    /// What a protocol version has: leaves out the stimuli and steps that are for others, and the stimuli `keeps` refuses. A
+    /// stimulus that stands for many breakages becomes as many.
     #[must_use]
     pub fn only(mut self, pack: &Pack, keeps: impl Fn(&str, &Stimulus) -> bool) -> Self {
-        self.stimuli.retain(|name, stimulus| {
-            let spec = stimulus
-                .spec
-                .as_deref()
-                .and_then(|spec| spec.parse::<VersionRange>().ok());
-            spec.is_none_or(|spec| spec.contains(pack.version)) && keeps(name, stimulus)
-        });
+        let has = |spec: &str| {
+            let range = spec.parse::<VersionRange>();
+            range.is_ok_and(|range| range.contains(pack.version))
+        };
+        let usual = self.spec.clone();
+        self.stimuli
+            .retain(|name, stimulus| has(stimulus.spec.as_ref().unwrap_or(&usual)) && keeps(name, stimulus));
+        for stimulus in self.stimuli.values_mut() {
+            stimulus.sends = steps_of(&stimulus.sends, has);
+            stimulus.hears = steps_of(&stimulus.hears, has);
+        }
+        for answer in self.answers.values_mut() {
+            *answer = steps_of(answer, has);
+        }
         self.stimuli = unfolded(self.stimuli, pack);
+        self.spec = within_major(&usual, pack);
         self
+    }
+}
+
+/// The steps that do not say by `spec:` that they are for other versions.
+fn steps_of(text: &str, has: impl Fn(&str) -> bool) -> String {
+    let mut kept = String::with_capacity(text.len());
+    let mut step = String::new();
+    let mut finish = |step: &mut String| {
+        let spec = step.lines().find_map(|line| line.strip_prefix("  spec: "));
+        if spec.is_none_or(|spec| has(spec.trim_matches('"'))) {
+            kept.push_str(step);
+        }
+        step.clear();
+    };
+    for line in text.lines() {
+        if line.starts_with("- ") {
+            finish(&mut step);
+        }
+        step.push_str(line);
+        step.push('\n');
+    }
+    finish(&mut step);
+    kept
+}
+
+/// A range of versions as far as it is of the major version of a pack: stimuli, breakages and steps were chosen for that.
+fn within_major(range: &str, pack: &Pack) -> String {
+    let major = pack.version.major;
+    let whole = format!("{major}.0").parse();
+    let has_whole = |range: VersionRange| whole.is_ok_and(|first| range.contains(first));
+    match range.parse::<VersionRange>().is_ok_and(has_whole) {
+        true => format!(">={major}.0, <{}", major + 1),
+        false => format!("{range}, <{}", major + 1),
     }
 }
 

@@ -62,10 +62,12 @@ pub struct TopicRule {
 enum Judged {
     /// Messages, one by one.
     Messages,
-    /// Devices of both sides, by tests and beside reference devices.
+    /// Devices of both sides, by tests and beside reference devices, as far as there is something to judge.
     Devices,
     /// Vehicles.
     Agv,
+    /// Master controls.
+    MasterControl,
 }
 
 /// `protocol.toml`.
@@ -75,6 +77,7 @@ struct Protocol {
     id: String,
     version: String,
     judges: Vec<Judged>,
+    finds_every_fault: bool,
     topic_template: String,
     #[serde(default = "usual_digits")]
     timestamp_digits: usize,
@@ -108,6 +111,7 @@ pub struct Pack {
     /// The version written into headers.
     pub version: Version,
     judges: Vec<Judged>,
+    finds_every_fault: bool,
     topics: Vec<TopicRule>,
     schemas: BTreeMap<String, MessageSchema>,
     vocabulary: Value,
@@ -192,6 +196,7 @@ impl Pack {
             id: protocol.id,
             version,
             judges: protocol.judges,
+            finds_every_fault: protocol.finds_every_fault,
             topics: protocol.topic,
             schemas,
             topic_template: protocol.topic_template,
@@ -213,7 +218,18 @@ impl Pack {
     /// Whether devices of this side can be judged by it.
     #[must_use]
     pub fn judges(&self, role: Role) -> bool {
-        self.judges_devices() || role == Role::Agv && self.judges.contains(&Judged::Agv)
+        let own = match role {
+            Role::Agv => Judged::Agv,
+            Role::MasterControl => Judged::MasterControl,
+        };
+        self.judges_devices() || self.judges.contains(&own)
+    }
+
+    /// Whether every fault of the reference devices that breaks an obligation of this version has to be found in it. Otherwise
+    /// no more is proven than that each clause is failed by one.
+    #[must_use]
+    pub fn finds_every_fault(&self) -> bool {
+        self.finds_every_fault
     }
 
     /// The topics of the protocol.

@@ -42,7 +42,7 @@ pub enum Claim {
     NoHook(String),
 }
 
-const SCOPES: [&str; 3] = ["INSTANT", "NODE", "EDGE"];
+const SCOPES: [&str; 4] = ["INSTANT", "NODE", "EDGE", "ZONE"];
 
 impl FromStr for Claim {
     /// What is wrong, and what to do about it.

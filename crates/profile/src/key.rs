@@ -127,6 +127,11 @@ pub const STATEMENTS: &[Statement] = &[
         doc: "A metre of free floor lies on both sides of every edge of the course, so that curves may be ordered and \
               obstacles driven round.",
     },
+    Statement {
+        name: "zones-on-course",
+        doc: "Tests may put zones of their own on the nodes and edges of the course: no other vehicle goes by them, and the \
+              vehicle may be moved where one has stopped it.",
+    },
 ];
 
 /// What the harness finds out by itself at the beginning of a run; tests ask for it as for a statement.
@@ -139,6 +144,8 @@ pub enum Place {
     Anywhere,
     /// On any edge, where its effect is shown as an information of this type.
     Shown,
+    /// In a zone, wherever the test puts it.
+    Zone,
     /// At a node the profile names.
     Node,
     /// On an edge the profile names.
@@ -293,6 +300,18 @@ pub const SAMPLE_ACTIONS: &[SampleKind] = &[
         "The beginning of charging where there is no charger.",
     ),
     sample(
+        "zone-action",
+        "zoneAction",
+        Place::Zone,
+        "An action in a zone that ends within a second or two and does no harm.",
+    ),
+    sample(
+        "long-zone-action",
+        "longZoneAction",
+        Place::Zone,
+        "An action in a zone that runs for some seconds and does no harm.",
+    ),
+    sample(
         "lift",
         "lift",
         Place::Node,
@@ -324,6 +343,7 @@ pub const KEYS: &[Key] = &[
     key("device.small-map-storage", Kind::Flag),
     key("device.room-beside-edges", Kind::Flag),
     key("device.extends-base", Kind::Flag),
+    key("device.zones-on-course", Kind::Flag),
     key("device.long-action", Kind::Action(Place::Anywhere)),
     key("device.brief-action", Kind::Action(Place::Anywhere)),
     key("device.uninterruptible-action", Kind::Action(Place::Anywhere)),
@@ -342,6 +362,8 @@ pub const KEYS: &[Key] = &[
     key("device.failing-fine-positioning", Kind::Action(Place::Node)),
     key("device.start-charging", Kind::Action(Place::Node)),
     key("device.failing-start-charging", Kind::Action(Place::Node)),
+    key("device.zone-action", Kind::Action(Place::Zone)),
+    key("device.long-zone-action", Kind::Action(Place::Zone)),
     key("device.lift", Kind::Action(Place::Node)),
     key("device.claims", Kind::Claims),
     key("bench.listen", Kind::Address),
@@ -450,7 +472,7 @@ impl Kind {
             ),
             Self::Version => "a text such as \"1.2\" or \"1.2.3\"".to_owned(),
             Self::Command => "a list such as [\"./agv\", \"--broker\", \"{broker-host}:{broker-port}\"]".to_owned(),
-            Self::Action(Place::Anywhere) => {
+            Self::Action(Place::Anywhere | Place::Zone) => {
                 "an action such as \"beep\" or { type = \"wait\", parameters = { seconds = 20 } }".to_owned()
             }
             Self::Action(Place::Shown) => {

@@ -148,7 +148,13 @@ impl SampleActions {
     #[must_use]
     pub fn bindings(&self) -> Map<String, Value> {
         self.iter()
-            .map(|(kind, action)| (kind.variable.to_owned(), action.value()))
+            .map(|(kind, action)| {
+                let mut value = action.value();
+                if kind.place == Place::Zone {
+                    value["list"] = action.list();
+                }
+                (kind.variable.to_owned(), value)
+            })
             .collect()
     }
 }
@@ -191,6 +197,12 @@ impl SampleAction {
             }
         }
         value
+    }
+
+    /// Its parameters as a zone has them.
+    fn list(&self) -> Value {
+        let all = self.parameters.iter();
+        all.map(|(key, value)| json!({ "key": key, "value": value })).collect()
     }
 
     /// In one line: `pick at P1 {…}`.

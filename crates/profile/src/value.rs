@@ -108,7 +108,7 @@ impl Value {
         match (kind, value) {
             (Kind::Flag, DeValue::Boolean(flag)) => Ok(Self::Flag(*flag)),
             (Kind::Action(place), DeValue::Table(table)) => action(table, place),
-            (Kind::Action(place), _) if place != Place::Anywhere => Err(wrong_type()),
+            (Kind::Action(place), _) if !matches!(place, Place::Anywhere | Place::Zone) => Err(wrong_type()),
             (Kind::Speed, _) => speed(number(value).ok_or_else(wrong_type)?),
             (Kind::Files | Kind::Brokers | Kind::Claims | Kind::Names | Kind::Command, DeValue::Array(items)) => {
                 let mut texts = Vec::with_capacity(items.len());
@@ -159,7 +159,7 @@ impl Value {
                 .parse::<tck_pack::Version>()
                 .map(|_| Self::Text(text.to_owned()))
                 .map_err(|_| expected("not a version".to_owned())),
-            Kind::Action(Place::Anywhere) => Ok(Self::Action(SampleAction::plain(text))),
+            Kind::Action(Place::Anywhere | Place::Zone) => Ok(Self::Action(SampleAction::plain(text))),
             Kind::Action(_) => Err(expected("this has to be said in a profile".to_owned())),
             Kind::Command => {
                 let words = shlex::split(text).ok_or_else(|| expected("a quote is left open".to_owned()))?;
@@ -254,7 +254,7 @@ impl Value {
 fn action(table: &DeTable<'_>, place: Place) -> Result<Value, Refusal> {
     let expected = |label: String| Refusal::bad(label).hint(format!("expected {}", Kind::Action(place).hint()));
     let own = match place {
-        Place::Anywhere => None,
+        Place::Anywhere | Place::Zone => None,
         Place::Shown => Some("shows"),
         Place::Node => Some("node"),
         Place::Edge => Some("edge"),

@@ -141,6 +141,12 @@ pub const VEHICLE_WORDS: &[VehicleWord] = &[
         &[],
         "A pause and its end by a message are possible again.",
     ),
+    word("block-hibernation", &[], "startHibernation and stopHibernation fail."),
+    word(
+        "unblock-hibernation",
+        &[],
+        "A hibernation and its end by a message are possible again.",
+    ),
     word("lock-charger", &[], "stopCharging fails."),
     word(
         "unlock-charger",
@@ -234,13 +240,42 @@ pub const VEHICLE_WORDS: &[VehicleWord] = &[
     ),
     word(
         "fail-actions",
-        &["actionType", "errorType"],
-        "Actions end in FAILED, all or those of the type, with an error.",
+        &["actionType", "errorType", "retriable"],
+        "Actions end in FAILED, all or those of the type, with an error; in RETRIABLE where that was asked for and `retriable` is said.",
     ),
     word(
         "refuse-map",
         &["errorType"],
         "It refuses every downloadMap with this error.",
+    ),
+    that(
+        &[Moves],
+        word(
+            "fall-asleep",
+            &[],
+            "It gives up what it has to do and sleeps, as after startHibernation.",
+        ),
+    ),
+    that(&[Moves], word("wake-up", &[], "It wakes up by itself.")),
+    word(
+        "ask-for-zone",
+        &["zoneId", "zoneSetId", "requestType", "requestId", "way", "over"],
+        "Its states ask for access to a zone, or with REPLANNING for a way through it, of so many metres or none; it goes by the answers and does nothing with what it gets.",
+    ),
+    word(
+        "ask-for-corridor",
+        &["edgeId", "sequenceId", "requestId"],
+        "Its states ask for the corridor of an edge; it goes by the answers and does nothing with what it gets.",
+    ),
+    word(
+        "withdraw-requests",
+        &["requestId"],
+        "Its states no longer ask for what they were told to ask for: one request, or all.",
+    ),
+    word(
+        "hold-requests",
+        &["status"],
+        "No answer changes what its states ask for any more; with a status they show that.",
     ),
     word(
         "declare",

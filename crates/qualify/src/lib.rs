@@ -65,10 +65,10 @@ pub fn qualify(
     let faults = possible(library, pack, faults, depth);
     outcome.kills = match depth {
         Depth::Everything => each(&faults, |fault| grounds.kill(fault, DRAWN, &|_| true))?,
-        Depth::Faults | Depth::Clauses if outcome.is_latest => {
+        Depth::Faults | Depth::Clauses if outcome.owes_faults => {
             each(&faults, |fault| find::find(&grounds, role, fault))?
         }
-        // In an older version no fault has to be found; what it fails is seen when the clauses are proven.
+        // Where no fault has to be found, what it fails is seen when the clauses are proven.
         Depth::Faults | Depth::Clauses => faults.iter().map(Kill::nothing).collect(),
     };
     if depth == Depth::Clauses {
@@ -142,7 +142,7 @@ fn prepared<'l>(
     };
     let outcome = Qualification {
         role,
-        is_latest: pack.id == library.rules.packs.latest().id,
+        owes_faults: pack.finds_every_fault(),
         blemishes,
         deciders,
         kills: Vec::new(),

@@ -15,8 +15,8 @@ use tck_suite::{Exceptions, Unproven};
 pub struct Qualification {
     /// The side whose reference device it is.
     pub role: Role,
-    /// Whether it is the newest protocol version there is.
-    pub is_latest: bool,
+    /// Whether each fault has to be found in this version.
+    pub owes_faults: bool,
     /// What is not a pass on the faultless device: decider and verdict.
     pub blemishes: Vec<(Decider, Verdict)>,
     /// Everything that passes on the faultless device.
@@ -50,11 +50,11 @@ impl Qualification {
         all.filter(move |one| !unproven.iter().any(|decider| decider.is(one)))
     }
 
-    /// Faults that are not found as they should be, and for which the suites give no reason. They have to be found in the
-    /// newest version; of an older one each clause has to be proven.
+    /// Faults that are not found as they should be, and for which the suites give no reason. They have to be found where
+    /// the version says so; otherwise each clause has to be proven.
     #[must_use]
     pub fn missed(&self) -> Vec<&Kill> {
-        let owed = self.kills.iter().filter(|_| self.is_latest);
+        let owed = self.kills.iter().filter(|_| self.owes_faults);
         owed.filter(|kill| !is_found(self.role, kill) && !self.exceptions.is_unfound(kill.fault.name))
             .collect()
     }
@@ -81,7 +81,7 @@ impl Qualification {
         }
         for kill in &self.kills {
             let is_lapse = BuiltIn::lapse(self.role, kill.fault.name).is_some();
-            if self.is_latest && is_lapse && kill.named() == Some(Verdict::Fail) {
+            if self.owes_faults && is_lapse && kill.named() == Some(Verdict::Fail) {
                 all.push(format!("lapse {} fails, so that it is a fault", kill.fault.name));
             }
         }

@@ -153,7 +153,7 @@ impl QualifiedSide {
         });
         Qualification {
             role,
-            is_latest: pack.id == library.rules.packs.latest().id,
+            owes_faults: pack.finds_every_fault(),
             blemishes: self
                 .blemishes
                 .iter()

@@ -6,6 +6,7 @@ use serde_json::{Map, Value};
 
 use super::idle::Home;
 use super::pace::{Pace, between_looks};
+use super::zones;
 use tck_course::{Course, Edge, Layout, Node, Standing};
 use tck_engine::IdForm;
 use tck_journal::Reason;
@@ -99,6 +100,11 @@ pub(super) fn course_of(
         tell_nothing(&mut course);
     }
     Pace::of(judge.ground().factsheet().as_deref()).set(&mut course);
+    zones::put(
+        &mut course,
+        &named(test, "${course.", ".zone}"),
+        judge.ground().factsheet().as_deref(),
+    )?;
     Ok(Some(flat(course)))
 }
 
@@ -169,6 +175,20 @@ fn will(judge: &RunJudge) -> Option<u64> {
         } if *keep_alive > 0 => Some(u64::from(*keep_alive) * 1_500 + WILL_MARGIN),
         _ => None,
     }
+}
+
+/// Every NAME between these two in the files of a test.
+fn named(test: &Test, before: &str, behind: &str) -> BTreeSet<String> {
+    let steps = test.sections().into_iter().flat_map(|(_, steps)| steps);
+    let mut texts: Vec<&str> = steps.map(|step| step.span.source.text.as_str()).collect();
+    texts.push(&test.source.text);
+    texts.dedup();
+    let rests = texts.into_iter().flat_map(|text| text.split(before).skip(1));
+    let name = |rest: &str| {
+        let end = rest.find(|c: char| !c.is_ascii_alphanumeric() && c != '-')?;
+        rest.get(end..)?.starts_with(behind).then(|| rest[..end].to_owned())
+    };
+    rests.filter_map(name).collect()
 }
 
 /// Every NAME of `${run.NAME}` in the files of a test.

@@ -153,6 +153,16 @@ impl Capabilities {
             Need::Optional(path) => self.optional(path),
             Need::NoOptional(path) => reverse(self.optional(path), path),
             Need::NotRequired(path) => self.not_required(path),
+            Need::Zone(name) => {
+                let listed = name
+                    .as_ref()
+                    .map_or_else(|| "zones".to_owned(), |name| format!("zone {name}"));
+                self.declared(&[listed], |sheet| sheet.heeds_zones(name.as_deref()))
+            }
+            Need::NoZone(name) => {
+                let heeds = self.declared(&[format!("zone {name}")], |sheet| sheet.heeds_zones(Some(name)));
+                reverse(heeds, &format!("zone {name}"))
+            }
             Need::Limit(path) => self.declared(&[format!("limit {path}")], |sheet| sheet.has_limit(path)),
         }
     }
@@ -298,7 +308,9 @@ fn serves_a_map_to_read(test: &Test) -> bool {
     let mut steps = test.sections().into_iter().flat_map(|(_, steps)| steps);
     steps.any(|step| match &*step.verb {
         Verb::Serve(serve) => {
-            serve.file.is_none() && matches!(serve.behaviour, ServeBehaviour::Well | ServeBehaviour::Slow)
+            serve.file.is_none()
+                && serve.json.is_none()
+                && matches!(serve.behaviour, ServeBehaviour::Well | ServeBehaviour::Slow)
         }
         _ => false,
     })

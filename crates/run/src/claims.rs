@@ -13,7 +13,10 @@ pub(super) fn statements(device: &profile::Device) -> BTreeMap<String, bool> {
         all.entry("extends-base".to_owned()).or_insert(true);
     }
     // A sample action that is not named is not one that the device does not have.
-    for kind in SAMPLE_ACTIONS.iter().filter(|kind| kind.place == Place::Anywhere) {
+    for kind in SAMPLE_ACTIONS
+        .iter()
+        .filter(|kind| matches!(kind.place, Place::Anywhere | Place::Zone))
+    {
         if device.sample_actions.0.contains_key(kind.name) {
             all.insert(kind.name.to_owned(), true);
         }

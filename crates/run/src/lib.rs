@@ -51,6 +51,7 @@ mod site;
 pub mod supervisor;
 mod time_left;
 mod virtual_run;
+mod zones;
 
 pub use answering::{Answering, AnsweringError};
 pub use bundle::{Bundle, BundleError, JOURNAL, write_whole};

@@ -41,6 +41,18 @@ impl Sheet {
         Some(value.and_then(Value::as_f64).is_some_and(|limit| limit > 0.0))
     }
 
+    /// Whether it heeds zones of a type, or of any; a list that is missing is empty (the ruling of ZONE-01). `None` when it does
+    /// not say what kind of vehicle it is.
+    #[must_use]
+    pub fn heeds_zones(&self, name: Option<&str>) -> Option<bool> {
+        let kind = self.type_specification.there()?;
+        let mut listed = kind.supported_zones.texts();
+        Some(match name {
+            Some(name) => listed.any(|zone_type| zone_type == name),
+            None => listed.next().is_some(),
+        })
+    }
+
     /// Whether it lists an action; `None` when it has no such list.
     #[must_use]
     pub fn has_action(&self, name: &str, scope: Option<&str>) -> Option<bool> {

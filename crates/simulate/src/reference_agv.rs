@@ -10,7 +10,7 @@ use tck_course::{BUILT_IN_MAP, BUILT_IN_UPPER_MAP, Edge, Layout};
 use tck_pack::Participant;
 use tck_pack::{Pack, Role};
 use tck_profile::{Place, SAMPLE_ACTIONS, SampleAction, SampleActions, TimeLimits};
-use tck_reference::agv::{AgvConfig, ErrorEnd, ErrorNames, ErrorRule, LayoutNode, OnboardMap};
+use tck_reference::agv::{AgvConfig, ErrorEnd, ErrorNames, ErrorRule, LayoutNode, OnboardMap, ZONE_TYPES};
 use tck_reference::deviations::agv::UnknownTolerance;
 use tck_view::Names;
 
@@ -66,6 +66,8 @@ fn sample_actions(layout: &Layout) -> SampleActions {
         ("failing-fine-positioning", "finePositioning", LIFT, json!({})),
         ("start-charging", "startCharging", CHARGER, json!({})),
         ("failing-start-charging", "startCharging", SHELF, json!({})),
+        ("zone-action", "beep", "", json!({ "duration": 0.05 })),
+        ("long-zone-action", "beep", "", json!({ "duration": 0.5 })),
         ("lift", "initPosition", LIFT, pose),
     ];
     let sample = |(name, action_type, place, parameters): (&str, &str, &str, Value)| {
@@ -73,7 +75,7 @@ fn sample_actions(layout: &Layout) -> SampleActions {
         let mut action = SampleAction::plain(action_type);
         action.parameters = parameters.as_object().cloned().unwrap_or_default();
         match kind.place {
-            Place::Anywhere => {}
+            Place::Anywhere | Place::Zone => {}
             Place::Shown => action.shows = Some(place.to_owned()),
             Place::Node => action.node = Some(place.to_owned()),
             Place::Edge => action.edge = Some(place.to_owned()),
@@ -182,6 +184,7 @@ impl ReferenceAgv {
             map_capacity: 8,
             start_node: first,
             zone_set: Some("hall-zones".to_owned()),
+            zone_types: ZONE_TYPES.map(str::to_owned).into(),
             maps: [BUILT_IN_MAP, BUILT_IN_UPPER_MAP]
                 .map(|map| OnboardMap {
                     map_id: map.to_owned(),
@@ -248,18 +251,29 @@ impl ReferenceAgv {
     fn follow_a_line(&mut self) {
         self.layout = Arc::new(Layout::clone(&self.layout).with_directions());
         self.config.stops_between_nodes = false;
-        // It knows no coordinates, so it has no use for a pose or a map.
+        // It knows no coordinates, so it has no use for a pose, a map or a zone.
         let without = ["initPosition", "downloadMap", "enableMap", "deleteMap"];
         self.config.without_actions = without.map(str::to_owned).into();
+        self.config.zone_types.clear();
         let branch = |edge: &Edge| Some((edge.start.clone(), edge.direction.clone()?, edge.end.clone()));
         self.config.branches = Some(self.layout.edges().filter_map(branch).collect());
     }
 
     /// It carries nothing, charges nowhere, and offers no action that needs a station.
     fn without_loads(&mut self) {
+        self.config
+            .zone_types
+            .retain(|kind| matches!(kind.as_str(), "BLOCKED" | "SPEED_LIMIT"));
+        let simple = [
+            "long-action",
+            "brief-action",
+            "uninterruptible-action",
+            "zone-action",
+            "long-zone-action",
+        ];
         Arc::make_mut(&mut self.actions)
             .0
-            .retain(|name, _| matches!(*name, "long-action" | "brief-action" | "uninterruptible-action"));
+            .retain(|name, _| simple.contains(name));
         let of_stations = [
             "pick",
             "drop",
@@ -272,6 +286,7 @@ impl ReferenceAgv {
     }
 
     fn without_maps(&mut self) {
+        self.config.zone_types.clear();
         self.config
             .features
             .retain(|feature| feature != "maps" && feature != "mapActions");
@@ -294,6 +309,7 @@ impl ReferenceAgv {
             ("line-guided", self.config.branches.is_some()),
             ("free-navigation", self.config.plans),
             ("room-beside-edges", true),
+            ("zones-on-course", self.config.branches.is_none()),
         ]
         .into_iter()
         .chain(
@@ -443,6 +459,10 @@ impl ReferenceAgv {
         "release-pause",
         "block-pause",
         "unblock-pause",
+        "block-hibernation",
+        "unblock-hibernation",
+        "lose-position",
+        "find-position",
         "lock-charger",
         "unlock-charger",
         "use-lift",

@@ -62,6 +62,8 @@ impl ReferenceMasterControl {
             serial_number: vehicle.subject.serial_number.clone(),
             version: vehicle.config.version.clone(),
             features: vehicle.config.features.clone(),
+            names: vehicle.config.names.clone(),
+            timestamp_digits: vehicle.config.timestamp_digits,
             topics: vehicle.config.topics.clone(),
         });
         let config = MasterControlConfig {
@@ -71,6 +73,7 @@ impl ReferenceMasterControl {
             reconnect_delay: Duration::from_millis(300),
             resend_after: Duration::from_secs(2),
             trigger_timeout: Duration::from_secs(10),
+            lease: Some(Duration::from_secs(8)),
             ..MasterControlConfig::default()
         };
         Self {

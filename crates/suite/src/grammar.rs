@@ -115,7 +115,7 @@ pub(super) fn need(node: &Node, problems: &mut Problems) -> Option<Need> {
             name: owned(name),
             scope: None,
         },
-        ["action", name, scope @ ("INSTANT" | "NODE" | "EDGE")] => Need::Action {
+        ["action", name, scope @ ("INSTANT" | "NODE" | "EDGE" | "ZONE")] => Need::Action {
             name: owned(name),
             scope: Some(owned(scope)),
         },
@@ -128,6 +128,9 @@ pub(super) fn need(node: &Node, problems: &mut Problems) -> Option<Need> {
         ["hook", name] => Need::Hook(owned(name)),
         ["profile", name] => Need::Profile(owned(name)),
         ["limit", name] => Need::Limit(owned(name)),
+        ["zones"] => Need::Zone(None),
+        ["no", "zone", name] => Need::NoZone(owned(name)),
+        ["zone", name] => Need::Zone(Some(owned(name))),
         _ => {
             let forms = [
                 "action NAME",
@@ -141,6 +144,9 @@ pub(super) fn need(node: &Node, problems: &mut Problems) -> Option<Need> {
                 "hook NAME",
                 "profile NAME",
                 "limit NAME",
+                "zones",
+                "zone TYPE",
+                "no zone TYPE",
             ];
             problems.add(
                 Diagnostic::new(

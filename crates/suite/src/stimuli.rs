@@ -15,7 +15,7 @@ use tck_journal::event::{Direction, LinkFault};
 pub(super) const SEND_KEYS: &[&str] = &[
     "route", "payload", "action", "as", "with", "withAll", "blocking", "actions", "patch", "raw", "qos", "retain",
 ];
-pub(super) const SERVE_KEYS: &[&str] = &["file", "behaviour"];
+pub(super) const SERVE_KEYS: &[&str] = &["file", "json", "behaviour"];
 pub(super) const OPERATOR_KEYS: &[&str] = &["with", "within", "each"];
 pub(super) const VEHICLE_KEYS: &[&str] = &["with", "of"];
 
@@ -387,6 +387,7 @@ pub(super) fn serve(served: &Node, fields: &Fields<'_>, problems: &mut Problems)
             text_of(node, problems);
             term(node, problems)
         }),
+        json: fields.get("json", problems).map(|node| term(node, problems)),
         behaviour: fields
             .word("behaviour", "unknown-behaviour", &BEHAVIOURS, problems)
             .unwrap_or_default(),

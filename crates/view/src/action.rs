@@ -34,6 +34,12 @@ view! {
 static NO_VALUE: Member<Json> = Member::Absent;
 
 impl ActionView {
+    /// Whether the vehicle gives its order up for it.
+    #[must_use]
+    pub fn clears_order(&self) -> bool {
+        matches!(self.action_type.text(), Some("cancelOrder" | "startHibernation"))
+    }
+
     /// The value of the first parameter with this key: absent where there is none, or where it has no value.
     ///
     /// This is the one reader of action parameters; use `text`, `float`, `flag` on what it gives.

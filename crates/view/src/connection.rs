@@ -29,6 +29,12 @@ impl ConnectionView {
         self.is_offline() || self.is_broken()
     }
 
+    /// Whether it says that the vehicle sleeps, and hears nothing but what wakes it.
+    #[must_use]
+    pub fn is_hibernating(&self) -> bool {
+        self.connection_state.is("HIBERNATING")
+    }
+
     /// Whether it says that the connection is broken; with or without underscore, depending on the version.
     #[must_use]
     pub fn is_broken(&self) -> bool {

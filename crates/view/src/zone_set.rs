@@ -18,7 +18,7 @@ view! {
         /// The map it is for.
         map_id: Text = "mapId",
         /// For people.
-        zone_set_descriptor: Text = "zoneSetDescriptor",
+        zone_set_descriptor: Text = "zoneSetDescriptor" apart,
         /// Its zones.
         zones: List<Zone> = "zones",
     }
@@ -32,7 +32,7 @@ view! {
         /// What it is for.
         zone_type: Text = "zoneType",
         /// For people.
-        zone_descriptor: Text = "zoneDescriptor",
+        zone_descriptor: Text = "zoneDescriptor" apart,
         /// Its corners.
         vertices: List<Point> = "vertices",
         /// In metres a second, of a speed limit.
@@ -64,7 +64,7 @@ view! {
         /// What is to be done.
         action_type: Text = "actionType",
         /// For people.
-        action_descriptor: Text = "actionDescriptor",
+        action_descriptor: Text = "actionDescriptor" apart,
         /// What may go on beside it.
         blocking_type: Text = "blockingType",
         /// What it needs to know.

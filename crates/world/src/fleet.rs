@@ -6,7 +6,7 @@ use std::time::Duration;
 use tck_base::clock::Moment;
 use tck_journal::Entry;
 use tck_journal::event::{Direction, Event, Packet};
-use tck_view::{MessageView, Names, OrderView, Topic};
+use tck_view::{MessageView, Names, OrderView, Print, Topic};
 
 /// How many orders are remembered.
 const ORDERS: usize = 4096;
@@ -25,6 +25,8 @@ pub struct FleetSeen {
     before: Option<(u64, u32)>,
     /// The vehicle that was given an order first.
     owners: BTreeMap<String, usize>,
+    /// The zones that came first under the id of a set.
+    zone_sets: BTreeMap<String, Print>,
     /// The connections of the device that are open.
     links: BTreeMap<u64, Link>,
 }
@@ -58,6 +60,15 @@ impl FleetSeen {
             && let Some(order) = entry.view(Topic::Order, names).and_then(MessageView::order)
         {
             self.order(order, vehicle);
+        }
+        if delivered
+            && name == Topic::ZoneSet.as_str()
+            && let Some(set) = entry.view(Topic::ZoneSet, names).and_then(MessageView::zone_set)
+            && let Some(set) = set.zone_set.there()
+            && self.zone_sets.len() < ORDERS
+        {
+            let id = set.zone_set_id.or_empty().to_owned();
+            self.zone_sets.entry(id).or_insert(set.essence);
         }
     }
 
@@ -116,6 +127,11 @@ impl FleetSeen {
     /// The headerId that came before that of this entry on the topics of the same name of all vehicles.
     pub fn before(&self, seq: u64) -> Option<u32> {
         self.before.filter(|(of, _)| *of == seq).map(|(_, id)| id)
+    }
+
+    /// A fingerprint of the zones that came first under the id of a set.
+    pub fn zone_set(&self, id: &str) -> Option<Print> {
+        self.zone_sets.get(id).copied()
     }
 
     /// The vehicle that was given an order, by its place in the fleet.

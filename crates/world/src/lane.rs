@@ -133,6 +133,8 @@ pub struct Corridor {
     pub right: f64,
     /// Whether the contour is meant, not the kinematic centre.
     pub contour: bool,
+    /// Whether it has to be released first.
+    pub release_required: bool,
 }
 
 impl Corridor {
@@ -142,6 +144,7 @@ impl Corridor {
             left: width(&corridor.left_width)?,
             right: width(&corridor.right_width)?,
             contour: corridor.reference_point.is("CONTOUR"),
+            release_required: corridor.release_required.is(true),
         })
     }
 }

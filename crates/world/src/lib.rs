@@ -19,6 +19,7 @@ mod mock;
 mod observation;
 pub mod ordered;
 mod orders;
+pub mod outline;
 pub mod rest;
 mod restarts;
 mod setting;
@@ -27,6 +28,7 @@ mod starts;
 mod topics;
 mod way;
 mod world;
+pub mod zones;
 
 pub use displaced::Displaced;
 pub use factsheets::{Factsheet, Factsheets, Offered};

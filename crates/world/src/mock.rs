@@ -64,6 +64,7 @@ impl ShownState {
         let actions: Vec<_> = state
             .action_states
             .iter()
+            .chain(state.instant_action_states.iter())
             .take(ELEMENTS)
             .map(|action| {
                 let id = short(&action.action_id).unwrap_or_default();

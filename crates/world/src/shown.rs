@@ -64,10 +64,8 @@ impl ShownOrder {
     /// Learns from the next record.
     pub(crate) fn learn(&mut self, record: &Observation<'_>) {
         let moved = record.instant_actions_to_vehicle().is_some_and(|message| {
-            message.all_actions().any(|action| {
-                let name = action.action_type.or_empty();
-                name == "cancelOrder" || sets_position(name)
-            })
+            let mut all = message.all_actions();
+            all.any(|action| action.clears_order() || sets_position(action.action_type.or_empty()))
         });
         if moved || record.outside_influence() {
             self.abandoned.clone_from(&self.order);

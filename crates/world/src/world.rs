@@ -16,6 +16,7 @@ use crate::setting::Setting;
 use crate::shown::ShownOrder;
 use crate::starts::Starts;
 use crate::way::Way;
+use crate::zones::ZonesSeen;
 
 /// A fact of the world, by name: what somebody reads says so, and nothing else is learned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,6 +41,8 @@ pub enum Fact {
     Factsheets,
     /// [`World::starts`].
     Starts,
+    /// [`World::zones`].
+    Zones,
 }
 
 impl Fact {
@@ -89,6 +92,7 @@ pub struct World {
     mock: MockVehicle,
     factsheets: Factsheets,
     starts: Starts,
+    zones: ZonesSeen,
     fleet: Rc<RefCell<FleetSeen>>,
 }
 
@@ -141,6 +145,9 @@ impl World {
         }
         if learns(Fact::Starts) {
             self.starts.learn(record, &self.mock);
+        }
+        if learns(Fact::Zones) {
+            self.zones.learn(record);
         }
     }
 
@@ -208,6 +215,12 @@ impl World {
     #[must_use]
     pub fn starts(&self) -> &Starts {
         self.read(Fact::Starts, &self.starts)
+    }
+
+    /// The zones that hold for it, and where it is in them.
+    #[must_use]
+    pub fn zones(&self) -> &ZonesSeen {
+        self.read(Fact::Zones, &self.zones)
     }
 
     /// What came to all vehicles of its fleet; nothing for a check in a test.

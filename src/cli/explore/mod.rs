@@ -48,20 +48,21 @@ pub fn explore(arguments: &Explore) -> Result<Exit, Problem> {
         reference::is_tested(&Asked::of_explore(arguments), &effective, &surroundings, &super::tell)?;
     }
     let pack = tck_run::pack_of(&library, &effective)?;
-    if !pack.judges_devices() {
+    let role = effective.profile.device.role;
+    let grammar =
+        Grammar::load(&library.assets, role).map_err(|error| Diagnostic::whole("explore", error.to_string()))?;
+    if !grammar.speaks(&pack) {
         let title = format!(
             "of protocol version {} there are no stimuli of an exploration yet",
             pack.version
         );
-        let known = library.rules.packs.of_devices().map(|known| known.version.to_string());
+        let known = library.rules.packs.of_role(role).filter(|known| grammar.speaks(known));
+        let known = known.map(|known| known.version.to_string());
         let hint = format!("there are for {}", known.collect::<Vec<_>>().join(", "));
         return Err(Diagnostic::whole("no-stimuli", title).hint(hint).into());
     }
-    let role = effective.profile.device.role;
     check_faults(role, &arguments.fault)?;
-    let grammar = Grammar::load(&library.assets, role)
-        .map_err(|error| Diagnostic::whole("explore", error.to_string()))?
-        .only(&pack, |_, _| true);
+    let grammar = grammar.only(&pack, |_, _| true);
     let grammar = focused(grammar, &arguments.focus)?;
     if arguments.stimuli {
         super::print(&show::stimuli(&grammar))?;

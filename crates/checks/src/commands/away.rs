@@ -1,6 +1,7 @@
 //! Nothing is sent to a vehicle that is known to be gone.
 
 use super::{Command, Found};
+use crate::finding::quote;
 use tck_base::clock::Moment;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::{Event, Packet};
@@ -11,10 +12,10 @@ use tck_world::{Listen, Observation, Topic};
 /// `commands/while-away`.
 pub(crate) const AWAY: Check = Check {
     name: "commands/while-away",
-    decides: &["CONN-12"],
+    decides: &["CONN-12", "HIB-13"],
     doc: "While the connection topic of a vehicle says CONNECTIONBROKEN or OFFLINE, no order and no instant action but a \
-          request for a message is sent to it. What comes within the time a message may take is not judged. A warning: \
-          nothing forbids it.",
+          request for a message is sent to it; while it says HIBERNATING, nothing but stopHibernation. What comes within \
+          the time a message may take is not judged. A warning where it is gone: nothing forbids it.",
     arguments: &[],
     listens: &[
         Listen::Fault,
@@ -33,6 +34,8 @@ pub(crate) const AWAY: Check = Check {
 struct Away {
     /// Since when the master control may know that the vehicle is gone, and the word.
     since: Option<(Moment, String)>,
+    /// Whether it only sleeps.
+    asleep: bool,
 }
 
 impl Running for Away {
@@ -56,8 +59,10 @@ impl Running for Away {
         if let Some(message) = record.said_connection() {
             let state = message.connection_state.or_empty();
             let gone = message.is_broken() || Some(state) == context.pack.word("connection.offline");
-            self.since = gone.then(|| (now, state.chars().take(64).collect()));
-            return gone;
+            self.asleep = Some(state) == context.pack.word("connection.hibernating");
+            let silent = gone || self.asleep;
+            self.since = silent.then(|| (now, state.chars().take(64).collect()));
+            return silent;
         }
         let Some((since, word)) = &self.since else { return false };
         let Some(command) = Command::read(record) else {
@@ -67,6 +72,9 @@ impl Running for Away {
             return false;
         }
         let asks = |kind: &str| matches!(kind, "stateRequest" | "factsheetRequest");
+        if self.asleep {
+            return asleep(command, word, &mut Found::new(record, findings));
+        }
         let mut kinds = command
             .actions()
             .into_iter()
@@ -79,6 +87,26 @@ impl Running for Away {
         Found::new(record, findings).remark("CONN-12", format!("{what} is sent to a vehicle that is {word}"));
         true
     }
+}
+
+/// What is sent to a vehicle that sleeps.
+fn asleep(command: Command<'_>, word: &str, found: &mut Found<'_>) -> bool {
+    let actions = command.actions();
+    let mut kinds = actions.iter().map(|(_, action)| action.action_type.or_empty());
+    match command {
+        Command::Order(_) => found.broken("HIB-13", format!("an order is sent to a vehicle that is {word}")),
+        Command::Instant(_) => {
+            if let Some(kind) = kinds
+                .clone()
+                .find(|kind| !matches!(*kind, "stopHibernation" | "stateRequest"))
+            {
+                found.broken("HIB-13", format!("{} is sent to a vehicle that is {word}", quote(kind)));
+            } else if kinds.any(|kind| kind == "stateRequest") {
+                found.remark("HIB-13", format!("a state is asked for of a vehicle that is {word}"));
+            }
+        }
+    }
+    true
 }
 
 impl Away {
@@ -109,6 +137,21 @@ mod tests {
             .wait(after)
             .commands("instantActions", &json!({ "actions": [action] }));
         trace.judge("commands/while-away").summary()
+    }
+
+    #[test]
+    fn who_sleeps_is_only_woken() {
+        let sent = |kind: &str| {
+            let mut trace = Trace::master_control();
+            trace.sent("connection", &json!({ "connectionState": "HIBERNATING" }));
+            let action = json!({ "actionId": "1", "actionType": kind });
+            trace
+                .wait(5.0)
+                .commands("instantActions", &json!({ "actions": [action] }));
+            trace.judge("commands/while-away").summary()
+        };
+        // A version without that word has no vehicle that sleeps.
+        assert!(sent("startPause").is_empty());
     }
 
     #[test]

@@ -14,11 +14,11 @@ use tck_world::{Fact, Listen, Observation, Outside, ShownState};
 /// A base is given up only by cancelOrder.
 pub(crate) const BASE_KEPT: Check = Check {
     name: "commands/base-kept",
-    decides: &["ORD-CANCEL-01"],
+    decides: &["ORD-CANCEL-01", "ORD-CANCEL-22"],
     doc: "While the states of the vehicle show released elements or a running action of an order, no other order is sent \
           to it and no update replaces them, unless cancelOrder has come before and the vehicle has reported it done or \
           shows nothing left of the order. Another order behind a cancelOrder that is not done, or beside nothing but a \
-          running action, is a warning, and so is an update after cancelOrder, unless that has FAILED. A vehicle that may have given its order up by itself is not judged; where an \
+          running action, is a warning, and so is an update after cancelOrder, unless that has FAILED; where updates are strict it is more than that. A vehicle that may have given its order up by itself is not judged; where an \
           action has failed, what is left tells.",
     arguments: &[],
     listens: &[Listen::Everything],
@@ -91,7 +91,11 @@ impl BaseKept {
             "update {update} of order {} comes after cancelOrder",
             quote(&self.order)
         );
-        found.remark("ORD-CANCEL-01", text);
+        if context.pack.has("strictUpdates") {
+            found.broken("ORD-CANCEL-22", text);
+        } else {
+            found.remark("ORD-CANCEL-01", text);
+        }
         true
     }
 

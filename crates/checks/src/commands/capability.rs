@@ -35,6 +35,68 @@ pub(crate) const REQUIRED: Check = Check {
     start: |_| Box::new(Required),
 };
 
+/// `commands/omni-only`.
+pub(crate) const OMNI_ONLY: Check = Check {
+    name: "commands/omni-only",
+    decides: &["ORD-MSG-34"],
+    doc: "orientationType GLOBAL and reachOrientationBeforeEntering come only to vehicles that drive in all directions, by \
+          mobileRobotKinematics of the factsheet. A warning where the factsheet lists the field.",
+    arguments: &[],
+    listens: &[Listen::Delivered(Topic::Order)],
+    reads: &[Fact::Factsheets],
+    needs: &[Edge::orientation_type],
+    start: |_| Box::new(OmniOnly),
+};
+
+struct OmniOnly;
+
+impl Running for OmniOnly {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let order = Command::read(record).and_then(Command::order);
+        let Some(order) = order else { return false };
+        let sheets = context.world.factsheets().valid(record, context);
+        let is_omni = |sheet: &Factsheet| {
+            let kind = sheet.view.type_specification.there();
+            kind.is_none_or(|kind| !kind.kinematic.is_there() || kind.kinematic.or_empty().starts_with("OMNI"))
+        };
+        if sheets.is_empty() || sheets.iter().any(|sheet| is_omni(sheet)) {
+            return false;
+        }
+        let mut found = Found::new(record, findings);
+        let mut judged = false;
+        for edge in order.edges.iter().take(ELEMENTS) {
+            judged = true;
+            let global = context.pack.word("orientationType.global").unwrap_or("GLOBAL");
+            let fields = [
+                (Edge::orientation_type, edge.orientation_type.is(global)),
+                (
+                    Edge::reach_orientation_before_entering,
+                    edge.presence(Edge::reach_orientation_before_entering).is_something(),
+                ),
+            ];
+            for (field, _) in fields.into_iter().filter(|(_, sent)| *sent) {
+                let name = field.usual_name();
+                let text = format!(
+                    "{name} of edge {} is for vehicles that drive in all directions",
+                    quote(edge.edge_id.or_empty())
+                );
+                let field = format!("order.edges.{name}");
+                if sheets.iter().any(|sheet| lists(sheet, &field)) {
+                    found.remark("ORD-MSG-34", text);
+                } else {
+                    found.broken("ORD-MSG-34", text);
+                }
+            }
+        }
+        judged
+    }
+}
+
 /// Optional fields by what they belong to.
 const OF_POSITION: [Field; 4] = [
     NodePosition::theta,
@@ -42,7 +104,7 @@ const OF_POSITION: [Field; 4] = [
     NodePosition::allowed_deviation_theta,
     NodePosition::map_description,
 ];
-const OF_EDGE: [Field; 12] = [
+const OF_EDGE: [Field; 13] = [
     Edge::edge_description,
     Edge::max_speed,
     Edge::max_height,
@@ -50,6 +112,7 @@ const OF_EDGE: [Field; 12] = [
     Edge::orientation,
     Edge::orientation_type,
     Edge::direction,
+    Edge::reach_orientation_before_entering,
     Edge::rotation_allowed,
     Edge::max_rotation_speed,
     Edge::trajectory,
@@ -121,7 +184,7 @@ impl Running for Optional {
                 continue;
             }
             let text = format!("{field} is sent, which the factsheet does not list");
-            if field.ends_with("Description") {
+            if field.ends_with("Description") || field.ends_with("Descriptor") {
                 found.remark("OPT-03", text);
             } else {
                 found.broken("OPT-03", text);

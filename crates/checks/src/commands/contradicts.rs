@@ -67,7 +67,7 @@ impl Running for Contradicts {
         let placed = context.world.mock().last().is_some_and(|seen| seen.pose.is_some());
         let mut found = Found::new(record, findings);
         for kind in kinds {
-            if kind == "initPosition" && placed {
+            if matches!(kind, "initPosition" | "initializePosition") && placed {
                 let text = format!(
                     "the instant action {} comes to a vehicle that has an order to drive",
                     quote(kind)

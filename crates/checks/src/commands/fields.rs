@@ -31,7 +31,7 @@ pub(crate) const POSITION_RANGE: Check = Check {
     name: "commands/position-range",
     decides: &["ORD-MSG-09", "MAP-02"],
     doc: "theta of a node lies between minus pi and pi, allowedDeviationXY is not below 0, allowedDeviationTheta lies \
-          between 0 and pi. Coordinates that are far too big for metres are a warning.",
+          between 0 and pi. An ellipse whose a is less than its b is a warning. Coordinates that are far too big for metres are a warning.",
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[],
@@ -146,6 +146,17 @@ fn position_range(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<
                 "ORD-MSG-09",
                 format!("allowedDeviationXY {} of node {id} is below 0", number(allowed)),
             );
+        }
+        if let Some(Deviation::Ellipse(ellipse)) = position.allowed_deviation_xy.there()
+            && let (Some(a), Some(b)) = (ellipse.a.float(), ellipse.b.float())
+            && a < b
+        {
+            let text = format!(
+                "a {} of allowedDeviationXY of node {id} is less than b {}",
+                number(a),
+                number(b)
+            );
+            found.remark("ORD-MSG-09", text);
         }
         let turned = position.allowed_deviation_theta.float();
         let turned = turned.filter(|allowed| !(0.0..=PI + ROUNDING).contains(allowed));

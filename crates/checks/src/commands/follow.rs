@@ -17,7 +17,14 @@ use tck_world::{Fact, Listen, Observation, Outside, ShownState, Topic};
 /// `commands/updates`.
 pub(crate) const UPDATES: Check = Check {
     name: "commands/updates",
-    decides: &["ORD-UPD-03", "ORD-UPD-04", "ORD-UPD-05", "ORD-UPD-06", "ORD-UPD-12"],
+    decides: &[
+        "ORD-UPD-03",
+        "ORD-UPD-04",
+        "ORD-UPD-05",
+        "ORD-UPD-06",
+        "ORD-UPD-12",
+        "ORD-UPD-15",
+    ],
     doc: "An update keeps the orderId, raises orderUpdateId, begins with the last released node as it was sent before \
           and repeats nothing else of the base. Steps larger than one, and a stitching node that has lost actions or \
           optional values, are warnings. A message that is sent again unchanged is no update. Where the vehicle has \
@@ -484,7 +491,7 @@ fn updated(
         .filter(|sent| (sent.update >= confirmed || sent.update == newest) && !refused(sent));
     let stitching = candidates.filter_map(|sent| sent.end.as_ref()).find(is_end);
     if let Some(end) = stitching {
-        stitched(&end.node, first, found);
+        stitched(&end.node, first, context.pack.has("strictUpdates"), found);
         return;
     }
     // The last one that was sent, by the letter, and unknown to the vehicle: by a ruling a warning.

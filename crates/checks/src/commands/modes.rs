@@ -9,10 +9,10 @@ use tck_world::{Fact, Listen, Observation, Outside, Topic};
 /// `commands/modes`.
 pub(crate) const MODES: Check = Check {
     name: "commands/modes",
-    decides: &["MODE-04"],
-    doc: "While the states of the vehicle show MANUAL, SERVICE or TEACHIN, no order and no instant action is sent to it. \
-          What comes within the time a message may take is not judged; stateRequest and factsheetRequest alone are a \
-          warning.",
+    decides: &["MODE-04", "MODE-11"],
+    doc: "While the states of the vehicle show MANUAL, SERVICE, TEACHIN or STARTUP, no order and no instant action is sent to \
+          it, and in INTERVENED no instant action but cancelOrder. What comes within the time a message may take is not \
+          judged; stateRequest and factsheetRequest alone are a warning.",
     arguments: &[],
     listens: &[
         Listen::Vehicle,
@@ -26,6 +26,25 @@ pub(crate) const MODES: Check = Check {
     needs: &[StateView::operating_mode],
     start: |_| Box::new(Modes::default()),
 };
+
+/// What may be sent in a mode that is not for the master control alone.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Lets {
+    /// Nothing at all.
+    Nothing,
+    /// Orders, and of all actions cancelOrder.
+    OrdersOnly,
+}
+
+impl Lets {
+    fn of(mode: &str, context: &CheckContext<'_>) -> Option<Self> {
+        let is = |name: &&str| context.pack.word(&format!("operatingMode.{name}")) == Some(mode);
+        if ["manual", "service", "teachIn", "startup"].iter().any(is) {
+            return Some(Self::Nothing);
+        }
+        is(&"intervened").then_some(Self::OrdersOnly)
+    }
+}
 
 #[derive(Default)]
 struct Modes {
@@ -47,12 +66,10 @@ impl Running for Modes {
         let Some(seen) = context.world.mock().last() else {
             return false;
         };
-        let word = |name: &str| context.pack.word(name).unwrap_or_default().to_owned();
-        let theirs = ["operatingMode.manual", "operatingMode.service", "operatingMode.teachIn"];
-        if !theirs.iter().any(|name| word(name) == seen.mode) {
+        let Some(lets) = Lets::of(&seen.mode, context) else {
             self.since = None;
             return false;
-        }
+        };
         let since = *self.since.get_or_insert(seen.at);
         let now = record.at().moment;
         if record.link.disturbed || now.since(since) < context.time.notice {
@@ -62,21 +79,29 @@ impl Running for Modes {
         let Some(command) = Command::read(record) else {
             return record.said_state().is_some();
         };
+        if lets == Lets::OrdersOnly && command.order().is_some() {
+            return false;
+        }
+        let id = if lets == Lets::Nothing { "MODE-04" } else { "MODE-11" };
         let mut found = Found::new(record, findings);
         let asks = |kind: &str| matches!(kind, "stateRequest" | "factsheetRequest");
         let actions = command.actions();
+        let mut kinds = actions.iter().map(|(_, action)| action.action_type.or_empty());
+        if lets == Lets::OrdersOnly && kinds.all(|kind| kind == "cancelOrder") {
+            return true;
+        }
         let only_asks = command.order().is_none()
             && !actions.is_empty()
             && actions.iter().all(|(_, action)| asks(action.action_type.or_empty()));
         if only_asks {
-            found.remark("MODE-04", format!("a request is sent to a vehicle in {}", seen.mode));
+            found.remark(id, format!("a request is sent to a vehicle in {}", seen.mode));
         } else {
             let what = if command.order().is_some() {
                 "an order"
             } else {
                 "an instant action"
             };
-            found.broken("MODE-04", format!("{what} is sent to a vehicle in {}", seen.mode));
+            found.broken(id, format!("{what} is sent to a vehicle in {}", seen.mode));
         }
         true
     }

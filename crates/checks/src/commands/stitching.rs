@@ -100,8 +100,12 @@ fn moved(old: &NodePosition, new: &NodePosition) -> [(Field, Change); 6] {
     ]
 }
 
-/// A stitching node against its first transmission.
-pub(super) fn stitched(before: &Node, now: &Node, found: &mut Found<'_>) {
+/// A stitching node against its first transmission, all of which has to be repeated where that is `strict`.
+pub(super) fn stitched(before: &Node, now: &Node, strict: bool, found: &mut Found<'_>) {
+    let tell = |found: &mut Found<'_>, text: String| match strict {
+        true => found.broken("ORD-UPD-06", text),
+        false => found.remark("ORD-UPD-06", text),
+    };
     let id = quote(now.node_id.or_empty());
     if !now.released.is(true) {
         found.broken("ORD-UPD-06", format!("stitching node {id} is not released any more"));
@@ -113,15 +117,12 @@ pub(super) fn stitched(before: &Node, now: &Node, found: &mut Found<'_>) {
                 match change {
                     Change::No => {}
                     Change::Other => found.broken("ORD-UPD-06", text),
-                    Change::CameOrWent => found.remark("ORD-UPD-06", text),
+                    Change::CameOrWent => tell(found, text),
                 }
             }
         }
         (None, None) => {}
-        _ => found.remark(
-            "ORD-UPD-06",
-            format!("nodePosition of stitching node {id} came or went"),
-        ),
+        _ => tell(found, format!("nodePosition of stitching node {id} came or went")),
     }
     let prints = |node: &Node| -> Vec<Print> {
         let actions = node.actions.iter().take(ELEMENTS);
@@ -129,11 +130,15 @@ pub(super) fn stitched(before: &Node, now: &Node, found: &mut Found<'_>) {
     };
     let (old, new) = (prints(before), prints(now));
     if new.iter().any(|action| !old.contains(action)) {
+        if strict {
+            let text = format!("further actions are put into the stitching node {id}, and not into a node behind it");
+            found.broken("ORD-UPD-15", text);
+        }
         found.broken(
             "ORD-UPD-06",
             format!("stitching node {id} has other actions than before"),
         );
     } else if old.iter().any(|action| !new.contains(action)) {
-        found.remark("ORD-UPD-06", format!("stitching node {id} has lost actions"));
+        tell(found, format!("stitching node {id} has lost actions"));
     }
 }

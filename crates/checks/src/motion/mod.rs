@@ -5,6 +5,7 @@
 
 mod axes;
 mod corridor;
+mod corridor_release;
 mod curve;
 mod edge_orientation;
 mod edge_rotation_speed;
@@ -17,6 +18,9 @@ mod velocity_sign;
 
 pub(super) use axes::AXES;
 pub(super) use corridor::{CORRIDOR, CORRIDOR_POINT, NEXT_CORRIDOR};
+pub(super) use corridor_release::{
+    CORRIDOR_ASKED, CORRIDOR_GRANTED, CORRIDOR_KEPT, CORRIDOR_LEASE, CORRIDOR_RETURNED, CORRIDOR_SHOWN,
+};
 pub(super) use curve::{CURVE_ORIENTATION, TRAJECTORY};
 pub(super) use edge_orientation::EDGE_ORIENTATION;
 pub(super) use edge_rotation_speed::EDGE_ROTATION_SPEED;

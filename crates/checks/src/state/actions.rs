@@ -192,6 +192,12 @@ impl Running for Kept {
         let Some(state) = record.state() else {
             return false;
         };
+        // While a vehicle starts, nothing that it says need be right.
+        if state.operating_mode.is("STARTUP") {
+            self.listed.clear();
+            self.order = None;
+            return false;
+        }
         if !state.action_states.is_there() {
             return false;
         }

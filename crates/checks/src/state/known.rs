@@ -149,7 +149,7 @@ impl OrderKnown {
         }
         let cancels = record
             .instant_actions_to_vehicle()
-            .is_some_and(|message| message.all_actions().any(|action| action.action_type.is("cancelOrder")));
+            .is_some_and(|message| message.all_actions().any(tck_view::ActionView::clears_order));
         if cancels {
             self.cancelled = self.before.as_ref().map(|before| before.pair.0.clone());
         }

@@ -17,6 +17,7 @@ pub(super) mod paused;
 pub(super) mod period;
 pub(super) mod place;
 pub(super) mod predefined;
+pub(super) mod requests;
 pub(super) mod route;
 pub(super) mod triggers;
 pub(super) mod values;

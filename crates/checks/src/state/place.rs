@@ -145,7 +145,7 @@ impl Running for LastNodePlace {
         if let Some(message) = record.instant_actions_to_vehicle() {
             for action in message.all_actions() {
                 match action.action_type.or_empty() {
-                    "cancelOrder" | "startPause" => self.stopped = true,
+                    "cancelOrder" | "startHibernation" | "startPause" => self.stopped = true,
                     "stopPause" => self.stopped = false,
                     other if sets_position(other) => self.last = None,
                     _ => {}

@@ -337,6 +337,24 @@ fn only_the_newest_versions_may_be_for_messages_alone() {
 }
 
 #[test]
+fn a_side_that_a_version_does_not_judge_is_refused_by_its_own_sentence() {
+    let files = Assets::of_source_tree().unwrap();
+    let of_schemas = files.under("schemas/").map(|file| {
+        let mut file = file.clone();
+        if file.path.ends_with("3.0/protocol.toml") {
+            file.text = file.text.replace(", \"master-control\"]", "]");
+        }
+        file
+    });
+    let packs = Packs::load(&Assets::built_in(of_schemas)).unwrap_or_else(|error| panic!("{error}"));
+    assert!(packs.for_devices("3.0", Role::Agv).is_ok());
+    let none = packs
+        .for_devices("3.0", Role::MasterControl)
+        .expect_err("messages and vehicles only");
+    assert_eq!(none.code(), "other-side-only");
+}
+
+#[test]
 fn good_messages_are_read_by_the_names_of_their_version() {
     use tck_view::{MessageView, StateView, Topic};
 

@@ -201,6 +201,7 @@ impl Agv {
     fn id_taken(&self, id: &str, known: usize) -> bool {
         self.actions.get(id).is_some_and(|action| match action.origin {
             Origin::Instant => known > 0 || !action.status.is_terminal(),
+            Origin::Zone(_) => true,
             Origin::Node(sequence_id) | Origin::Edge(sequence_id) => known > 0 && sequence_id <= self.order.base_end.1,
         })
     }

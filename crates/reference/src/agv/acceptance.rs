@@ -109,6 +109,10 @@ impl Agv {
             let refusal = Refusal::new(Rule::OtherOrderActive, "the vehicle is not in an automatic mode");
             self.object(Objection::Mode, refusal.because(Detail::Mode))?;
         }
+        if self.config.has("fatalRefuses") && self.errors.need_help() && self.allows(Permission::RefuseHelpless, true) {
+            let refusal = Refusal::new(Rule::OtherOrderActive, "the vehicle waits for somebody to help it");
+            return Err(refusal.because(Detail::Mode));
+        }
         if new {
             self.check_new(order)?;
             Ok(Decision::Begin)
@@ -196,7 +200,7 @@ impl Agv {
         let position = node.position.as_ref();
         let allowed = position.and_then(|position| position.allowed_deviation);
         let near = self.is_within(node, allowed.unwrap_or(0.0), true);
-        self.allows(Permission::BeginAt(node), near)
+        self.allows(Permission::BeginAt(node), near && !self.lost)
     }
 
     /// Whether it stands so far from a node at most, on the map of the node if that counts.

@@ -25,6 +25,8 @@ pub(crate) enum Area {
     InstantAction,
     Map,
     DuplicateMap,
+    ZoneSet,
+    DuplicateZoneSet,
     Localization,
     Load,
     Charging,
@@ -67,6 +69,22 @@ impl Problem {
         Self {
             area: Area::DuplicateMap,
             ..Self::map(action, reason)
+        }
+    }
+
+    /// A problem with the zone set an action is about.
+    pub(crate) fn zone_set(action: &Action, reason: &str) -> Self {
+        let mut problem = Self::new(Area::ZoneSet, action, reason);
+        let named = ("zoneSetId".to_owned(), action.text("zoneSetId").to_owned());
+        problem.references.push(named);
+        problem
+    }
+
+    /// A zone set that is on board already.
+    pub(crate) fn duplicate_zone_set(action: &Action, reason: &str) -> Self {
+        Self {
+            area: Area::DuplicateZoneSet,
+            ..Self::zone_set(action, reason)
         }
     }
 
@@ -154,7 +172,13 @@ impl Agv {
         if proceeds != Some(true) {
             return;
         }
-        if action.kind.is_some_and(|kind| kind.effect == Effect::DownloadMap) {
+        let fetches = |kind: &ActionKind| {
+            matches!(
+                kind.effect,
+                Effect::DownloadMap | Effect::DownloadZoneSet | Effect::UpdateCertificate
+            )
+        };
+        if action.kind.is_some_and(fetches) {
             self.download_failed(id, "the server did not deliver in time");
             return;
         }
@@ -208,6 +232,13 @@ impl Agv {
         self.report_failure(id, problem);
     }
 
+    /// An action waits until it is decided whether it is tried again.
+    pub(crate) fn waits_for_retry(&mut self, id: &str) {
+        if let Some(action) = self.actions.get_mut(id) {
+            action.end(Status::Retriable);
+        }
+    }
+
     /// Ends an action without success.
     pub(crate) fn end_failed(&mut self, id: &str) {
         if let Some(action) = self.actions.get_mut(id) {
@@ -221,6 +252,8 @@ impl Agv {
             Area::InstantAction => &names.instant_action,
             Area::Map => &names.map,
             Area::DuplicateMap => &names.duplicate_map,
+            Area::ZoneSet => &names.zone_set,
+            Area::DuplicateZoneSet => &names.duplicate_zone_set,
             Area::Localization => &names.localization,
             Area::Load => &names.load,
             Area::Charging => &names.charging,
@@ -228,15 +261,19 @@ impl Agv {
         // A version that has an error for instant actions has it for all that cannot be performed.
         let is_instant = self.actions.get(id).is_some_and(|action| !action.of_order());
         let name = match is_instant && self.config.error_rules.contains_key(&names.instant_action) {
-            true if problem.area != Area::DuplicateMap => &names.instant_action,
+            true if !matches!(problem.area, Area::DuplicateMap | Area::DuplicateZoneSet) => &names.instant_action,
             _ => name,
+        };
+        let lasts = match problem.area {
+            Area::DuplicateZoneSet => self.time_to_notice(),
+            _ => self.config.error_duration,
         };
         let error = ActiveError {
             error_type: name.clone(),
             fatal: false,
             references: problem.references.clone(),
             description: problem.reason.clone(),
-            life: Life::Until(self.moment() + self.config.error_duration),
+            life: Life::Until(self.moment() + lasts),
         };
         let action = self.actions.get(id).cloned();
         self.raise_failure(action.as_ref(), error);
@@ -255,6 +292,8 @@ impl Agv {
                 result.map_err(|reason| Problem::map(action, reason)).into()
             }
             Effect::DeleteMap => self.delete_map(action).into(),
+            Effect::EnableZoneSet => self.enable_zone_set(action).into(),
+            Effect::DeleteZoneSet => self.delete_zone_set(action).into(),
             Effect::StateRequest => {
                 self.report.requested = true;
                 Outcome::Done(None)
@@ -274,14 +313,25 @@ impl Agv {
                 self.connection.factsheet_asked = false;
                 Outcome::Done(None)
             }
+            Effect::Trigger => self.trigger_by_fleet(action),
+            Effect::StartHibernation => self.start_hibernation(action),
+            Effect::StopHibernation => self.stop_hibernation(action),
+            Effect::Shutdown => self.shutdown_asked(action),
+            Effect::UpdateCertificate => self.update_certificate(action),
             Effect::WaitForTrigger | Effect::WarningLights | Effect::Beep | Effect::Calibrate => Outcome::Done(None),
             Effect::CancelOrder => {
                 self.cancel_order(&action.request.id);
                 Outcome::Open
             }
             Effect::DownloadMap => self.begin_download(&action.request.id),
+            Effect::DownloadZoneSet => self.begin_zone_set_download(action),
+            Effect::ClearZoneActions => {
+                let stays = |action: &Action| !action.of_zone() || !action.status.is_terminal();
+                self.actions.retain(stays);
+                Outcome::Done(None)
+            }
             Effect::ClearInstantActions => {
-                let stays = |action: &Action| action.of_order() || !action.status.is_terminal();
+                let stays = |action: &Action| action.origin != Origin::Instant || !action.status.is_terminal();
                 self.actions.retain(stays);
                 Outcome::Done(None)
             }
@@ -382,6 +432,7 @@ impl Agv {
     /// Takes a pose over, and the node it is on.
     pub(crate) fn take_pose(&mut self, pose: Pose, node: &str) {
         self.happens(Event::Placed);
+        self.find_position();
         self.maps.enable_any(&pose.map_id);
         self.motion.place(pose);
         node.clone_into(&mut self.order.last_node);

@@ -14,6 +14,7 @@ pub(crate) enum Scope {
     Instant,
     Node,
     Edge,
+    Zone,
 }
 
 impl Scope {
@@ -23,6 +24,7 @@ impl Scope {
             Self::Instant => "INSTANT",
             Self::Node => "NODE",
             Self::Edge => "EDGE",
+            Self::Zone => "ZONE",
         }
     }
 }
@@ -38,6 +40,10 @@ pub(crate) enum Effect {
     EnableMap,
     DownloadMap,
     DeleteMap,
+    EnableZoneSet,
+    DownloadZoneSet,
+    DeleteZoneSet,
+    ClearZoneActions,
     StateRequest,
     LogReport,
     Pick,
@@ -45,6 +51,11 @@ pub(crate) enum Effect {
     DetectObject,
     FinePositioning,
     WaitForTrigger,
+    Trigger,
+    StartHibernation,
+    StopHibernation,
+    Shutdown,
+    UpdateCertificate,
     CancelOrder,
     ClearInstantActions,
     Retry,
@@ -100,10 +111,11 @@ const fn optional(key: &'static str, data_type: &'static str) -> Parameter {
 
 const INSTANT: &[Scope] = &[Scope::Instant];
 const INSTANT_NODE: &[Scope] = &[Scope::Instant, Scope::Node];
-const NODE: &[Scope] = &[Scope::Node];
 const EDGE: &[Scope] = &[Scope::Edge];
 const NODE_EDGE: &[Scope] = &[Scope::Node, Scope::Edge];
-const ALL: &[Scope] = &[Scope::Instant, Scope::Node, Scope::Edge];
+const NODE_EDGE_ZONE: &[Scope] = &[Scope::Node, Scope::Edge, Scope::Zone];
+const NODE_ZONE: &[Scope] = &[Scope::Node, Scope::Zone];
+const ALL: &[Scope] = &[Scope::Instant, Scope::Node, Scope::Edge, Scope::Zone];
 const MAP: &[Parameter] = &[required("mapId", "STRING"), required("mapVersion", "STRING")];
 const DURATION: &[Parameter] = &[optional("duration", "NUMBER")];
 
@@ -142,7 +154,19 @@ const DOWNLOAD: &[Parameter] = &[
     required("mapDownloadLink", "STRING"),
     optional("mapHash", "STRING"),
 ];
+const ZONE_SET: &[Parameter] = &[required("zoneSetId", "STRING")];
+const DOWNLOAD_ZONE_SET: &[Parameter] = &[
+    required("zoneSetId", "STRING"),
+    required("zoneSetDownloadLink", "STRING"),
+    optional("zoneSetHash", "STRING"),
+];
 const NAMED: &[Parameter] = &[required("actionId", "STRING")];
+const CERTIFICATE: &[Parameter] = &[
+    required("service", "STRING"),
+    required("keyDownloadLink", "STRING"),
+    required("certificateDownloadLink", "STRING"),
+    optional("certificateAuthorityDownloadLink", "STRING"),
+];
 const STATION: &[Parameter] = &[optional("stationType", "STRING"), optional("stationName", "STRING")];
 
 const fn kind(
@@ -181,6 +205,11 @@ impl ActionKind {
         self
     }
 
+    /// Whether a parameter of it is a list.
+    fn takes_a_list(&self) -> bool {
+        self.parameters.iter().any(|parameter| parameter.data_type == "ARRAY")
+    }
+
     const fn resulting(mut self, result: &'static str) -> Self {
         self.result = Some(result);
         self
@@ -188,7 +217,7 @@ impl ActionKind {
 }
 
 /// All actions, in the order of the factsheet.
-const KINDS: [ActionKind; 23] = [
+const KINDS: [ActionKind; 29] = [
     kind(
         "startPause",
         Effect::StartPause,
@@ -254,7 +283,7 @@ const KINDS: [ActionKind; 23] = [
     kind(
         "detectObject",
         Effect::DetectObject,
-        NODE_EDGE,
+        NODE_EDGE_ZONE,
         &[optional("objectType", "STRING")],
         "Looks for an object",
     )
@@ -262,7 +291,7 @@ const KINDS: [ActionKind; 23] = [
     kind(
         "finePositioning",
         Effect::FinePositioning,
-        NODE_EDGE,
+        NODE_EDGE_ZONE,
         STATION,
         "Aligns to a station",
     )
@@ -270,9 +299,45 @@ const KINDS: [ActionKind; 23] = [
     kind(
         "waitForTrigger",
         Effect::WaitForTrigger,
-        NODE,
+        NODE_ZONE,
         &[required("triggerType", "STRING")],
         "Waits for the button on the vehicle",
+    ),
+    kind(
+        "waitForTrigger",
+        Effect::WaitForTrigger,
+        NODE_ZONE,
+        &[required("triggerType", "ARRAY")],
+        "Waits for the button on the vehicle, or for the fleet control",
+    ),
+    kind(
+        "trigger",
+        Effect::Trigger,
+        INSTANT,
+        &[],
+        "Ends what waits for the fleet control",
+    ),
+    kind(
+        "startHibernation",
+        Effect::StartHibernation,
+        INSTANT,
+        &[optional("wakeUpTime", "STRING")],
+        "Clears the order and sleeps; wakeUpTime is a timestamp",
+    ),
+    kind(
+        "stopHibernation",
+        Effect::StopHibernation,
+        INSTANT,
+        &[],
+        "Wakes the vehicle up",
+    ),
+    kind("shutdown", Effect::Shutdown, INSTANT, &[], "Switches the vehicle off"),
+    kind(
+        "updateCertificate",
+        Effect::UpdateCertificate,
+        INSTANT,
+        CERTIFICATE,
+        "Fetches a certificate with its key and uses it from then on",
     ),
     kind("cancelOrder", Effect::CancelOrder, INSTANT, &[], "Gives the order up"),
     kind(
@@ -329,17 +394,56 @@ const KINDS: [ActionKind; 23] = [
     .taking_time(),
 ];
 
+/// The actions about zones, behind the others.
+const ZONE_KINDS: [ActionKind; 4] = [
+    kind(
+        "enableZoneSet",
+        Effect::EnableZoneSet,
+        INSTANT_NODE,
+        ZONE_SET,
+        "Enables a zone set on board",
+    ),
+    kind(
+        "downloadZoneSet",
+        Effect::DownloadZoneSet,
+        INSTANT,
+        DOWNLOAD_ZONE_SET,
+        "Fetches a zone set as JSON; zoneSetHash is SHA-256 in hexadecimal",
+    ),
+    kind(
+        "deleteZoneSet",
+        Effect::DeleteZoneSet,
+        INSTANT,
+        ZONE_SET,
+        "Removes a zone set",
+    ),
+    kind(
+        "clearZoneActions",
+        Effect::ClearZoneActions,
+        INSTANT_NODE,
+        &[],
+        "Removes actions of zones that have ended from their list",
+    ),
+];
+
 /// The actions this vehicle offers.
 pub(crate) fn offered(config: &AgvConfig) -> impl Iterator<Item = &'static ActionKind> {
-    KINDS.iter().filter(|kind| is_offered(config, kind))
+    let all = KINDS.iter().chain(&ZONE_KINDS);
+    all.filter(|kind| is_offered(config, kind))
 }
 
 fn is_offered(config: &AgvConfig, kind: &ActionKind) -> bool {
     let in_version = match kind.effect {
         Effect::EnableMap | Effect::DownloadMap | Effect::DeleteMap => config.has("mapActions"),
+        Effect::EnableZoneSet | Effect::DownloadZoneSet | Effect::DeleteZoneSet => config.heeds_zones(),
+        Effect::ClearZoneActions => config.heeds("ACTION"),
         Effect::FactsheetRequest => config.has("factsheetRequest"),
         Effect::ClearInstantActions => config.has("instantActionStates"),
         Effect::Retry | Effect::SkipRetry => config.has("retry"),
+        Effect::Trigger => config.has("triggers"),
+        Effect::WaitForTrigger => config.has("triggers") == kind.takes_a_list(),
+        Effect::StartHibernation | Effect::StopHibernation | Effect::Shutdown => config.has("hibernation"),
+        Effect::UpdateCertificate => config.has("certificates"),
         _ => true,
     };
     in_version && !config.without_actions.contains(kind.name)
@@ -403,6 +507,7 @@ pub(crate) fn refusal(
 fn fits(data_type: &str, value: &Value) -> bool {
     match data_type {
         "STRING" => value.is_string(),
+        "ARRAY" => value.is_array(),
         _ => value.is_number(),
     }
 }

@@ -60,6 +60,8 @@ impl Status {
 pub(crate) enum Origin {
     Node(u32),
     Edge(u32),
+    /// A zone it went through; which passage that was.
+    Zone(u32),
     Instant,
 }
 
@@ -74,6 +76,8 @@ pub(crate) struct Action {
     pub(crate) result: Option<String>,
     /// When the present stage ends; `None` if something else ends it.
     pub(crate) due: Option<Moment>,
+    /// How many files were asked for.
+    pub(crate) files: usize,
     /// Status and remaining time when it was held.
     pub(crate) held: Option<(Status, Option<Duration>)>,
 }
@@ -88,18 +92,24 @@ impl Action {
             status: Status::Waiting,
             result: None,
             due: None,
+            files: 0,
             held: None,
         }
     }
 
     /// Whether the action belongs to the order.
     pub(crate) fn of_order(&self) -> bool {
-        self.origin != Origin::Instant
+        matches!(self.origin, Origin::Node(_) | Origin::Edge(_))
     }
 
-    /// Whether it is under way, and belongs to the order.
+    /// Whether the action belongs to a zone.
+    pub(crate) fn of_zone(&self) -> bool {
+        matches!(self.origin, Origin::Zone(_))
+    }
+
+    /// Whether it is under way, and belongs to the order or to a zone.
     pub(crate) fn occupies(&self) -> bool {
-        self.of_order() && self.status.is_active()
+        self.origin != Origin::Instant && self.status.is_active()
     }
 
     /// Its actionId.
@@ -193,9 +203,9 @@ impl Actions {
         }
     }
 
-    /// Forgets what was triggered and not begun.
+    /// Forgets what of the order was triggered and not begun.
     pub(crate) fn drop_lists(&mut self) {
-        self.lists.clear();
+        self.lists.retain(|list| matches!(list.origin, Origin::Zone(_)));
     }
 
     /// Forgets everything.

@@ -7,8 +7,6 @@ use serde_json::{Value, json};
 
 use crate::Output;
 
-use super::action_kinds::Effect;
-use super::actions::Status;
 use super::errors::{ActiveError, Life};
 use super::hook_points::{Cause, Event, Permission};
 use super::motion::Pose;
@@ -39,6 +37,10 @@ pub const COMMANDS: &[&str] = &[
     "release-pause",
     "block-pause",
     "unblock-pause",
+    "lose-position",
+    "find-position",
+    "block-hibernation",
+    "unblock-hibernation",
     "lock-charger",
     "unlock-charger",
     "use-lift",
@@ -51,6 +53,9 @@ pub const COMMANDS: &[&str] = &[
 
 /// More things than this do not stand about.
 const MAX_OBSTACLES: usize = 100;
+
+/// How far off a mark on the floor can be read, in metres.
+const MARK: f64 = 0.3;
 
 impl Agv {
     pub(crate) fn command(&mut self, name: &str, arguments: &Value) {
@@ -71,6 +76,7 @@ impl Agv {
             "push-out" | "shift-position" => self.push_out(arguments.get("by").and_then(Value::as_f64)),
             "place-obstacle" if self.obstacles.len() < MAX_OBSTACLES => {
                 self.obstacles.insert(text("edgeId").to_owned());
+                self.sees_obstacle(text("edgeId"));
             }
             "remove-obstacle" => {
                 self.obstacles.remove(text("edgeId"));
@@ -82,12 +88,17 @@ impl Agv {
             "release-emergency-stop" => {
                 self.happens(Event::Releasing);
                 self.errors.released();
+                self.helped();
                 self.set_holds(|holds| holds.emergency = false);
             }
             "press-pause" => self.set_holds(|holds| holds.button = true),
             "release-pause" => self.set_holds(|holds| holds.button = false),
             "block-pause" => self.pause_blocked = true,
             "unblock-pause" => self.pause_blocked = false,
+            "lose-position" => self.lose_position(),
+            "find-position" => self.find_position(),
+            "block-hibernation" => self.sleep.blocked = true,
+            "unblock-hibernation" => self.sleep.blocked = false,
             "lock-charger" => self.charger_locked = true,
             "unlock-charger" => self.charger_locked = false,
             "enter-field" => self.set_holds(|holds| holds.field = true),
@@ -116,11 +127,14 @@ impl Agv {
         self.actions.clear();
         self.errors.clear();
         self.downloads.clear();
+        self.heeding.begins_anew();
         self.holds = super::Holds::default();
         self.strayed = false;
+        self.requests.clear();
         self.mode = Mode::Automatic;
         self.awaited_mode = None;
         self.charging = false;
+        self.sleep = self.sleep.ended();
         self.report = super::Report::default();
         if self.connection.online {
             self.pending.push(Output::Drop);
@@ -128,24 +142,6 @@ impl Agv {
         self.connection.dropped(moment + self.config.reconnect_delay);
         self.connection.count_anew();
         self.happens(Event::PowerCycled);
-    }
-
-    /// The button that waitForTrigger waits for; it serves all of them unless one is named.
-    pub(crate) fn trigger(&mut self, wanted: &str) {
-        let waits = |action: &&super::actions::Action| {
-            (wanted.is_empty() || action.request.id == wanted)
-                && action.status == Status::Running
-                && action.kind.is_some_and(|kind| kind.effect == Effect::WaitForTrigger)
-        };
-        let ids: Vec<String> = self
-            .actions
-            .iter()
-            .filter(waits)
-            .map(|action| action.request.id.clone())
-            .collect();
-        for id in &ids {
-            self.complete(id);
-        }
     }
 
     /// Master control keeps its order only between the automatic modes (MODE-05).
@@ -206,8 +202,28 @@ impl Agv {
         if self.config.has("modesClear") && matches!(mode, Mode::Service | Mode::Teachin | Mode::Startup) {
             self.order.last_node.clear();
         }
+        if mode.takes_orders() && self.order.last_node.is_empty() {
+            self.read_the_mark();
+        }
         let before = std::mem::replace(&mut self.mode, mode);
         self.happens(Event::ModeChanged(before));
+    }
+
+    /// A vehicle that follows a line reads the mark it stands on, and needs nobody to tell it the node.
+    fn read_the_mark(&mut self) {
+        if self.config.branches.is_none() {
+            return;
+        }
+        let pose = self.motion.pose(self.moment());
+        let mark = self
+            .config
+            .nodes
+            .iter()
+            .find(|node| pose.distance(node.x, node.y) < MARK);
+        if let Some(mark) = mark {
+            self.order.last_node.clone_from(&mark.id);
+            self.order.last_sequence = 0;
+        }
     }
 
     /// Whether there is an order to be given up.
@@ -249,7 +265,18 @@ impl Agv {
         pose.y = number("y").unwrap_or(pose.y);
         pose.theta = super::motion::wrapped(number("theta").unwrap_or(pose.theta));
         self.motion.place(pose);
+        self.forgets_node();
         self.report.requested = true;
+    }
+
+    /// It is no more on its last node, where the version wants that to be noticed (MODE-14).
+    fn forgets_node(&mut self) {
+        let pose = self.motion.pose(self.moment());
+        let node = self.config.node(&self.order.last_node);
+        let far = node.is_some_and(|node| pose.distance(node.x, node.y) > self.config.reach);
+        if far && self.config.has("modesClear") && self.allows(Permission::ForgetNode, true) {
+            self.order.last_node.clear();
+        }
     }
 
     /// A short way ahead, by hand.
@@ -281,7 +308,15 @@ impl Agv {
 
     fn clear_error(&mut self) {
         self.errors.cleared();
+        self.helped();
         self.set_holds(|holds| holds.defect = false);
+    }
+
+    /// Somebody has seen to it: what was refused because of it may be sent again.
+    pub(crate) fn helped(&mut self) {
+        if self.mode.keeps_orders() && !self.errors.need_help() {
+            self.errors.available();
+        }
     }
 
     fn emergency_stop(&mut self) {

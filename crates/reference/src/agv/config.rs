@@ -90,8 +90,20 @@ pub struct ErrorNames {
     pub after_cancel: String,
     /// An order in a mode that takes none (MODE-02).
     pub not_available: String,
+    /// The vehicle cannot tell where it is (STATE-MSG-19).
+    pub lost: String,
     /// A map that is on board is to be downloaded (MAP-23).
     pub duplicate_map: String,
+    /// A zone set is on board already (ZSET-13).
+    pub duplicate_zone_set: String,
+    /// A zone set cannot be used, or an action about one failed.
+    pub zone_set: String,
+    /// The vehicle is inside a blocked zone (ZONE-06).
+    pub blocked_zone: String,
+    /// An action of a zone would break the rule of another one (ZINT-03).
+    pub zone_action_conflict: String,
+    /// A node turns out to be out of reach on the way (ZERR-01).
+    pub node_unreachable: String,
 }
 
 /// What a protocol version says of an error that it names.
@@ -157,6 +169,12 @@ impl Default for ErrorNames {
             after_cancel: name("orderUpdateError"),
             not_available: name("orderError"),
             duplicate_map: name("mapError"),
+            duplicate_zone_set: name("zoneSetError"),
+            zone_set: name("zoneSetError"),
+            blocked_zone: name("zoneError"),
+            zone_action_conflict: name("zoneError"),
+            node_unreachable: name("noRouteError"),
+            lost: name("localizationError"),
         }
     }
 }
@@ -185,6 +203,12 @@ impl ErrorNames {
             (&mut names.after_cancel, "error.updateAfterCancel"),
             (&mut names.not_available, "error.notAvailable"),
             (&mut names.duplicate_map, "error.duplicateMap"),
+            (&mut names.duplicate_zone_set, "error.duplicateZoneSet"),
+            (&mut names.zone_set, "error.zoneSet"),
+            (&mut names.blocked_zone, "error.blockedZone"),
+            (&mut names.zone_action_conflict, "error.zoneActionConflict"),
+            (&mut names.node_unreachable, "error.nodeUnreachable"),
+            (&mut names.lost, "error.localization"),
         ];
         for (name, path) in entries {
             if let Some(word) = word(path) {
@@ -227,6 +251,8 @@ pub struct AgvConfig {
     pub start_node: String,
     /// The zone set it plans with, if it knows zones.
     pub zone_set: Option<String>,
+    /// Kinds of zones it heeds, in a version that sends zone sets.
+    pub zone_types: BTreeSet<String>,
     /// Driving speed in metres per second. Acceleration is ignored.
     pub speed: f64,
     /// Factor by which it is slower than usual for reasons of its own.
@@ -341,6 +367,7 @@ impl Default for AgvConfig {
             nodes: nodes.into(),
             start_node: "n1".into(),
             zone_set: None,
+            zone_types: BTreeSet::new(),
             speed: 2.0,
             slowness: 1.0,
             rotation_speed: std::f64::consts::PI,
@@ -393,6 +420,30 @@ impl AgvConfig {
         self.features.contains(feature)
     }
 
+    /// Whether it listens to a topic.
+    pub(crate) fn listens(&self, name: &str) -> bool {
+        match name {
+            "responses" => self.uses("releaseRequired") || self.asks_for_zones(),
+            "zoneSet" => self.heeds_zones(),
+            _ => true,
+        }
+    }
+
+    /// Whether it knows zones that it may enter only when it is allowed to.
+    pub(crate) fn asks_for_zones(&self) -> bool {
+        self.heeds("RELEASE") || self.heeds("COORDINATED_REPLANNING")
+    }
+
+    /// Whether it takes zone sets.
+    pub(crate) fn heeds_zones(&self) -> bool {
+        self.has("zones") && !self.zone_types.is_empty()
+    }
+
+    /// Whether it does what zones of a kind ask for.
+    pub(crate) fn heeds(&self, zone_type: &str) -> bool {
+        self.has("zones") && self.zone_types.contains(zone_type)
+    }
+
     /// Whether it follows a line and knows no coordinates.
     pub(crate) fn line_guided(&self) -> bool {
         self.branches.is_some()
@@ -403,6 +454,7 @@ impl AgvConfig {
         match field {
             "trajectory" => self.trajectories,
             "corridor" => self.trajectories && self.has("corridors"),
+            "releaseRequired" => self.uses("corridor") && self.has("corridorRelease"),
             "direction" => self.line_guided(),
             _ => false,
         }

@@ -118,8 +118,9 @@ impl Agv {
                 retain: true,
             }
         });
-        let topics = ["order", "instantActions"]
+        let topics = super::HEARD
             .into_iter()
+            .filter(|name| self.config.listens(name))
             .filter_map(|name| self.config.topic(name))
             .map(str::to_owned);
         let mut options = ConnectOptions {
@@ -141,6 +142,7 @@ impl Agv {
         self.connection.sessions = self.connection.sessions.saturating_add(1);
         self.connection.attempt_at = None;
         self.connection.shut_down = false;
+        self.sleep = self.sleep.ended();
         self.happens(Event::Connected);
         if self.allows(Permission::SayOnline, true) {
             self.publish_connection("ONLINE");

@@ -1,4 +1,4 @@
-//! Downloads of maps: one request to the server for each downloadMap action (section 6.7.3).
+//! Downloads of maps and zone sets: one request to the server for each action that fetches one (section 6.7.3).
 //!
 //! A download without mapVersion is refused: one table asks for it, the text does not (the ruling of MAP-16). A hash is
 //! compared as the parties have agreed (that of MAP-34).
@@ -9,7 +9,8 @@ use crate::{Download, Output};
 
 use super::Agv;
 use super::action_effect::{Outcome, Problem};
-use super::actions::Status;
+use super::action_kinds::Effect;
+use super::actions::{Action, Status};
 use super::hook_points::{Event, Permission};
 use super::maps;
 
@@ -48,10 +49,7 @@ impl Agv {
             action.text("mapVersion"),
             action.text("mapDownloadLink"),
         );
-        let under_way = self.downloads.under_way.values().filter_map(|id| self.actions.get(id));
-        let twice = under_way
-            .into_iter()
-            .any(|other| other.text("mapId") == map_id && other.text("mapVersion") == version);
+        let twice = self.is_downloading(|other| other.text("mapId") == map_id && other.text("mapVersion") == version);
         let known = self.maps.has_version(map_id, version) && !self.allows(Permission::DownloadAgain, false);
         let hindrances = [
             (known, "the map is on board already"),
@@ -69,17 +67,33 @@ impl Agv {
         if let Some((_, reason)) = hindrances.iter().find(|(hinders, _)| *hinders) {
             return Outcome::Failed(Problem::map(&action, reason));
         }
-        let token = self.downloads.next;
-        self.downloads.next += 1;
-        self.downloads.under_way.insert(token, action_id.to_owned());
-        let url = url.to_owned();
-        self.pending.push(Output::Fetch { token, url });
+        self.fetch(action_id, url)
+    }
+
+    /// Whether such an action is downloading something.
+    pub(crate) fn is_downloading(&self, which: impl Fn(&Action) -> bool) -> bool {
+        let under_way = self.downloads.under_way.values();
+        under_way.filter_map(|id| self.actions.get(id)).any(which)
+    }
+
+    /// Asks the server for the file of an action, which is INITIALIZING until it is heard of.
+    pub(crate) fn fetch(&mut self, action_id: &str, url: &str) -> Outcome {
+        self.ask_for_file(action_id, url);
         let due = self.moment() + self.config.download_timeout;
         if let Some(action) = self.actions.get_mut(action_id) {
             action.status = Status::Initializing;
             action.due = Some(due);
         }
         Outcome::Open
+    }
+
+    /// Asks a server for a file that an action needs.
+    pub(crate) fn ask_for_file(&mut self, action_id: &str, url: &str) {
+        let token = self.downloads.next;
+        self.downloads.next += 1;
+        self.downloads.under_way.insert(token, action_id.to_owned());
+        let url = url.to_owned();
+        self.pending.push(Output::Fetch { token, url });
     }
 
     /// The server was heard of.
@@ -106,15 +120,25 @@ impl Agv {
         let Some(action) = self.actions.get(action_id).cloned() else {
             return;
         };
+        let is_certificate = action.kind.is_some_and(|kind| kind.effect == Effect::UpdateCertificate);
         if file.is_empty() {
             self.download_failed(action_id, "the file is empty");
-        } else if !maps::hash_fits(file, action.text("mapHash")) && self.allows(Permission::CheckHash, true) {
+        } else if is_certificate {
+            self.downloads.forget(action_id);
+            self.certificate_file_done(&action);
+        } else if !maps::hash_fits(file, action.text(hash_of(&action))) && self.allows(Permission::CheckHash, true) {
             self.download_failed(action_id, "the file does not have the announced hash");
         } else {
             self.downloads.forget(action_id);
             self.happens(Event::Downloaded);
-            self.maps.store(action.text("mapId"), action.text("mapVersion"));
-            let outcome = self.ends(&action, Outcome::Done(None));
+            let stored = match is_of_zones(&action) {
+                true => self.zone_set_downloaded(&action, file),
+                false => {
+                    self.maps.store(action.text("mapId"), action.text("mapVersion"));
+                    Ok(())
+                }
+            };
+            let outcome = self.ends(&action, stored.into());
             self.conclude(action_id, outcome);
         }
     }
@@ -125,7 +149,21 @@ impl Agv {
         let Some(action) = self.actions.get(action_id).cloned() else {
             return;
         };
-        let outcome = self.ends(&action, Outcome::Failed(Problem::map(&action, reason)));
+        let problem = match is_of_zones(&action) {
+            true => Problem::zone_set(&action, reason),
+            false => Problem::map(&action, reason),
+        };
+        let outcome = self.ends(&action, Outcome::Failed(problem));
         self.conclude(action_id, outcome);
     }
+}
+
+/// Whether an action fetches a zone set.
+fn is_of_zones(action: &Action) -> bool {
+    action.kind.is_some_and(|kind| kind.effect == Effect::DownloadZoneSet)
+}
+
+/// The parameter with the hash of the file that an action fetches.
+fn hash_of(action: &Action) -> &'static str {
+    if is_of_zones(action) { "zoneSetHash" } else { "mapHash" }
 }

@@ -27,6 +27,10 @@ pub(crate) enum Life {
     WhileStopped,
     /// While the vehicle is outside its corridor.
     WhileOutside,
+    /// While the vehicle is in a zone.
+    WhileInZone,
+    /// While the vehicle cannot tell where it is.
+    WhileLost,
     /// While the vehicle itself has a defect.
     WhileDefective,
     /// Never.
@@ -69,7 +73,9 @@ impl Errors {
                 error.life,
                 Life::WhileStopped
                     | Life::WhileOutside
+                    | Life::WhileInZone
                     | Life::WhileDefective
+                    | Life::WhileLost
                     | Life::Always
                     | Life::UntilInstantAction
                     | Life::UntilMapAction
@@ -112,6 +118,22 @@ impl Errors {
         self.active.retain(|error| error.life != Life::WhileOutside);
     }
 
+    /// The vehicle does not break the rule of a zone any more.
+    pub(crate) fn left_zone(&mut self, error_type: &str, zone_id: &str) {
+        self.active.retain(|error| {
+            let about = error
+                .references
+                .iter()
+                .any(|(key, value)| key == "zoneId" && value == zone_id);
+            error.life != Life::WhileInZone || error.error_type != error_type || !about
+        });
+    }
+
+    /// The vehicle knows where it is again.
+    pub(crate) fn located(&mut self) {
+        self.active.retain(|error| error.life != Life::WhileLost);
+    }
+
     /// The defect was put right.
     pub(crate) fn cleared(&mut self) {
         self.active.retain(|error| error.life != Life::WhileDefective);
@@ -130,6 +152,12 @@ impl Errors {
             _ => None,
         });
         ends.min()
+    }
+
+    /// Whether the vehicle cannot go on before somebody has helped it.
+    pub(crate) fn need_help(&self) -> bool {
+        let stands = |life: Life| matches!(life, Life::WhileStopped | Life::WhileLost | Life::WhileDefective);
+        self.active.iter().any(|error| error.fatal && stands(error.life))
     }
 
     /// Whether nothing is wrong.

@@ -7,12 +7,13 @@ use serde_json::{Map, Value, json};
 use tck_view::Topic;
 
 use super::ability::SLOWEST;
-use super::action_kinds::{self, ActionKind, Effect, MAX_HEIGHT};
+use super::action_kinds::{self, ActionKind, Effect, MAX_HEIGHT, Scope};
 use super::config::LOAD_POSITIONS;
 use super::errors::MAX_ERRORS;
 use super::hook_points::Part;
 use super::path::{HALF_LENGTH, HALF_WIDTH};
 use super::read::MAX_STRING;
+use super::zone_sets::MOST_ZONES;
 use super::{Agv, AgvConfig};
 
 /// Optional parameters the vehicle acts on.
@@ -90,7 +91,7 @@ impl Agv {
         } else {
             "VIRTUAL_LINE_GUIDED"
         };
-        json!({
+        let mut kind = json!({
             "seriesName": "Reference AGV",
             "seriesDescription": "A simulated vehicle with two driven wheels and a lift",
             "agvKinematic": "DIFF",
@@ -98,7 +99,11 @@ impl Agv {
             "maxLoadMass": 500.0,
             "localizationTypes": [if self.config.line_guided() { "RFID" } else { "NATURAL" }],
             "navigationTypes": [navigation],
-        })
+        });
+        if self.config.heeds_zones() {
+            kind["supportedZones"] = json!(self.config.zone_types);
+        }
+        kind
     }
 
     fn physical_parameters(&self) -> Value {
@@ -142,6 +147,9 @@ impl Agv {
                 "defaultStateInterval": self.stated_interval().as_secs_f64(),
             },
         });
+        if self.config.heeds_zones() {
+            limits["maxArrayLens"]["zoneSet.zones"] = json!(MOST_ZONES);
+        }
         if let Some(interval) = self.config.visualization_interval {
             limits["timing"]["visualizationInterval"] = json!(interval.as_secs_f64());
         }
@@ -157,6 +165,8 @@ impl Agv {
         let special = [
             ("trajectory", "order.edges.trajectory"),
             ("corridor", "order.edges.corridor"),
+            ("releaseRequired", "order.edges.corridor.releaseRequired"),
+            ("releaseRequired", "order.edges.corridor.releaseLossBehavior"),
             ("direction", "order.edges.direction"),
         ];
         let special = special
@@ -183,7 +193,7 @@ impl Agv {
     }
 
     /// An optional parameter as the version writes it, if it has it.
-    fn spelled_parameter(&self, name: &str) -> Option<String> {
+    pub(crate) fn spelled_parameter(&self, name: &str) -> Option<String> {
         let (topic, path) = name.split_once('.')?;
         let names: Vec<&str> = path.split('.').collect();
         let own = self
@@ -194,7 +204,11 @@ impl Agv {
     }
 
     fn action_picture(&self, kind: &ActionKind) -> Value {
-        let scopes: Vec<&str> = kind.scopes.iter().map(|scope| scope.literal()).collect();
+        let scopes = kind.scopes.iter();
+        let scopes: Vec<&str> = scopes
+            .filter(|scope| **scope != Scope::Zone || self.config.heeds("ACTION"))
+            .map(|scope| scope.literal())
+            .collect();
         let mut picture = Map::new();
         picture.insert("actionType".into(), json!(kind.name));
         picture.insert("actionDescription".into(), json!(kind.description));

@@ -11,6 +11,9 @@ use super::objections::Objection;
 use super::order_message::{Edge, Node, Order};
 use super::order_state::Stop;
 use super::rejection::Rule;
+use super::requests::EdgeRequest;
+use super::zone_sets::ZoneSet;
+use super::zones::Zone;
 use super::{Holds, Mode};
 
 /// A part of a message.
@@ -24,6 +27,8 @@ pub(crate) enum Part<'a> {
     Edge(&'a Edge),
     /// One of actionStates.
     Action(&'a Action),
+    /// One of edgeRequests.
+    EdgeRequest(&'a EdgeRequest),
     /// One of errors.
     Error(&'a ActiveError),
     /// agvPosition, of a state and of a visualization.
@@ -138,6 +143,20 @@ pub(crate) enum Permission<'a> {
     TakeTime(&'a Action),
     /// It finds that it is outside its corridor on an edge, and whether that is to the left (CORR-06).
     Watch(&'a Edge, bool),
+    /// It asks for the corridor of an edge (CORR-11).
+    Ask(&'a Edge),
+    /// A new request has a number of its own (ZREQ-04).
+    CountRequest,
+    /// It leaves its trajectory on an edge (CORR-15).
+    UseCorridor(&'a Edge),
+    /// A request stays in its states (CORR-16).
+    KeepRequest,
+    /// A lease that has run out ends what was granted (REQ-09).
+    EndLease,
+    /// It goes back to its trajectory by the way it came (CORR-20).
+    ReturnAsItCame,
+    /// It heeds that a grant is lost (CORR-19).
+    HeedLoss(&'a EdgeRequest),
     /// The path over an edge is reported (STATE-14).
     ReportPath,
     /// States are sent.
@@ -150,8 +169,48 @@ pub(crate) enum Permission<'a> {
     MoveByHand,
     /// A map is enabled on the vehicle (MAP-26).
     EnableByHand,
+    /// A zone set is taken over that is on board already (ZSET-13).
+    TakeZoneSetAgain,
+    /// A zone set is taken over with a kind of zone that it does not heed (ZSET-26).
+    TakeZoneUnheeded,
+    /// A zone set is in force.
+    ApplyZoneSet(&'a ZoneSet),
+    /// A zone that is in force is heeded.
+    HeedZone(&'a Zone),
+    /// The outline decides whether it is in a zone, not the kinematic centre (ZONE-03).
+    GoByContour(&'a Zone),
+    /// It does not go into a zone, or through it (ZONE-05, ZONE-08, ZONE-21).
+    StayOut(&'a Zone),
+    /// It stops in a zone where it must not be (ZONE-06).
+    StopInZone,
+    /// It does what a zone asks for at its entry, inside or at its exit (ZONE-18).
+    ActInZone(&'a Zone, Passage),
+    /// It sees that an action of a zone breaks the rule of another one (ZINT-03).
+    SeeConflict,
+    /// It sets out for a node that was out of reach (ZERR-02).
+    TryAgain,
+    /// A zone set is in use, and not deleted (ZSET-16).
+    KeepZoneSet,
     /// The hash of a file is compared with the announced one (MAP-34).
     CheckHash,
+    /// A sleeping vehicle heeds what does not wake it (HIB-06).
+    HeedAsleep,
+    /// It sends states in its sleep (HIB-07).
+    SpeakAsleep,
+    /// Its order is cleared before it sleeps (HIB-04).
+    ClearForSleep,
+    /// It does not shut down (SHUT-01).
+    RefuseShutdown,
+    /// A trigger ends an action that waits for one (TRIG-01).
+    HeedTrigger(&'a Action),
+    /// updateCertificate is refused for a service that it does not know (CERT-02).
+    RefuseService,
+    /// A certificate is not fetched without TLS (CERT-03).
+    RefusePlainLink,
+    /// It forgets its last node when it is brought away from it (MODE-14).
+    ForgetNode,
+    /// An order is refused while it needs help (ERR-04).
+    RefuseHelpless,
     /// A FATAL error keeps the vehicle from running (ERR-04).
     StopForDefect,
 }
@@ -163,10 +222,23 @@ pub(crate) enum Hindrance {
     Mode,
     /// A pause, the emergency stop and the like (ACT-12).
     Hold,
+    /// It cannot tell where it is (STATE-MSG-19).
+    Lost,
     /// The order was cancelled, or is to be (ORD-CANCEL-02).
     Cancellation,
     /// An action (BLOCK-03, BLOCK-04).
     Action,
+}
+
+/// When an action of a zone is done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Passage {
+    /// As the vehicle goes in.
+    Entry,
+    /// While it is inside.
+    During,
+    /// As it has left.
+    Exit,
 }
 
 /// Why an error is listed.
@@ -182,6 +254,12 @@ pub(crate) enum Cause<'a> {
     Unreadable(&'a str),
     /// The vehicle is outside its corridor (CORR-07).
     Outside,
+    /// A zone set was not taken over.
+    ZoneSet,
+    /// A zone keeps it from going on.
+    Zone,
+    /// The vehicle cannot tell where it is (STATE-MSG-19).
+    Lost,
     /// The emergency stop is pressed.
     EmergencyStop,
     /// A part of the vehicle is not in order.
@@ -258,6 +336,8 @@ pub(crate) enum Event {
     DownloadRunning,
     /// A file is there; the map is stored next.
     Downloaded,
+    /// A zone set was taken over.
+    ZoneSetStored,
     /// instantActions were read.
     InstantsRead,
     /// An instant action cannot be read.
@@ -280,6 +360,10 @@ pub(crate) enum Event {
     PowerCycled,
     /// The emergency stop is released next.
     Releasing,
+    /// It has fallen asleep.
+    FallenAsleep,
+    /// It has woken up.
+    Awoken,
     /// The protective field is free next.
     FieldFreed,
     /// A state was sent.

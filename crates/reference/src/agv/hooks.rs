@@ -17,6 +17,7 @@ use super::order_message::{Corridor, Edge, Order};
 use super::order_state::Stop;
 use super::rejection::{Refusal, Rule};
 use super::report::{Changes, Telling};
+use super::requests::Answer;
 use super::{Agv, AgvConfig};
 use crate::ConnectOptions;
 use crate::hooks::Memory;
@@ -59,6 +60,8 @@ hooks! {
     ref bends(edge: &Edge, path: Path) -> Option<Path> = own(Some(path));
     /// The corridor of an edge, as the vehicle understands it.
     ref keeps_to(corridor: &mut Corridor) = each;
+    /// An answer to a request came in; it may be taken for another one.
+    mut hears_answer(answer: &mut Answer) = each;
     /// An order is read; it may be taken for something else.
     ref reads(message: &mut Value) = each;
     /// Another objection against an order.

@@ -110,14 +110,18 @@ impl Agv {
     }
 
     fn make_room(&mut self) {
-        let remembered = self.actions.iter().filter(|action| !action.of_order()).count();
+        let remembered = self
+            .actions
+            .iter()
+            .filter(|action| action.origin == Origin::Instant)
+            .count();
         if remembered < MAX_REMEMBERED {
             return;
         }
         let ended = self
             .actions
             .iter()
-            .find(|action| !action.of_order() && action.status.is_terminal());
+            .find(|action| action.origin == Origin::Instant && action.status.is_terminal());
         if let Some(oldest) = ended.map(|action| action.request.id.clone()) {
             self.actions.retain(|action| action.request.id != oldest);
         }
@@ -138,7 +142,9 @@ impl Agv {
 
     /// Begins an instant action that had to wait, if there is one.
     pub(crate) fn begin_waiting_instants(&mut self) -> bool {
-        let waits = |action: &&Action| !action.of_order() && action.status == Status::Waiting && action.held.is_none();
+        let waits = |action: &&Action| {
+            action.origin == Origin::Instant && action.status == Status::Waiting && action.held.is_none()
+        };
         let begins = |action: &&Action| waits(action) && self.allows(Permission::BeginInstant(action), true);
         let next = self.actions.iter().find(begins).map(Action::id);
         if let Some(id) = &next {

@@ -4,9 +4,9 @@
 //! ([`Device::handle`]), and takes out what is to be sent. An order is read by `read` and `order_message`, decided in
 //! `acceptance` (figure 8), with `updates` for what continues an order, `ability` for what the vehicle can do and
 //! `rejection` for how it says no. `order_state` holds the order, `progress` drives it, leg by leg as `way` and `path` plan them,
-//! and `cancel` ends it (figure 9). `actions` knows when an action runs, `blocking` what may run beside it, `action_effect`,
-//! `stations`, `maps` and `downloads` what it does. `instant` takes instant actions, `commands` what people do to the
-//! vehicle. `report` says all that in states, `factsheet` what the vehicle is.
+//! and `cancel` ends it (figure 9); `requests` asks for what has to be released. `actions` knows when an action runs, `blocking` what may run beside it, `action_effect`,
+//! `stations`, `maps`, `zone_sets` and `downloads` what it does. `instant` takes instant actions, `commands` what people do to the
+//! vehicle, `heeding` what it does about zones. `report` says all that in states, `factsheet` what the vehicle is.
 //!
 //! The vehicle asks at its points of decision whether it may, and says what happens: the words for both stand in `hook_points`
 //! and `objections`, and `hooks` is who else is asked. With nobody there the answer is what stands in the vehicle.
@@ -18,31 +18,40 @@ pub(crate) mod action_kinds;
 pub(crate) mod actions;
 mod blocking;
 pub(crate) mod cancel;
+mod certificates;
 mod commands;
 pub(crate) mod config;
 pub(crate) mod connection;
 pub(crate) mod downloads;
 pub(crate) mod errors;
 mod factsheet;
+pub(crate) mod heeding;
+pub(crate) mod hibernation;
 pub(crate) mod hook_points;
 pub(crate) mod hooks;
 pub(crate) mod instant;
+mod localization;
 pub(crate) mod maps;
 pub(crate) mod motion;
 pub(crate) mod objections;
 pub(crate) mod order_message;
 pub(crate) mod order_state;
 pub(crate) mod path;
+mod paths;
 pub(crate) mod progress;
 pub(crate) mod read;
 pub(crate) mod rejection;
 pub(crate) mod report;
+pub(crate) mod requests;
 mod stations;
 #[cfg(test)]
 mod tests;
+pub(crate) mod triggers;
 pub(crate) mod updates;
 pub(crate) mod way;
 mod wire;
+pub(crate) mod zone_sets;
+pub(crate) mod zones;
 
 use std::collections::{BTreeSet, VecDeque};
 
@@ -56,11 +65,18 @@ use actions::Actions;
 use connection::Connection;
 use downloads::Downloads;
 use errors::Errors;
+use heeding::Heeding;
 use hooks::SwitchedOn;
 use maps::Maps;
 use motion::{Motion, Pose};
 use order_state::OrderState;
 use report::{Report, Rest};
+use requests::Requests;
+use zone_sets::ZoneSets;
+pub use zones::ZONE_TYPES;
+
+/// Topic names it listens to.
+pub(crate) const HEARD: [&str; 4] = ["order", "instantActions", "zoneSet", "responses"];
 
 /// operatingMode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,13 +117,18 @@ pub(crate) struct Holds {
     pub(crate) field: bool,
     /// It is outside its corridor.
     pub(crate) outside: bool,
+    /// It has lost the release of what it drives through.
+    pub(crate) release: bool,
     /// A defect that keeps it from running.
     pub(crate) defect: bool,
+    /// It is in a zone where it must not be, or cannot do what it is asked to do there.
+    pub(crate) zone: bool,
 }
 
 impl Holds {
     pub(crate) fn any(self) -> bool {
-        self.pause || self.button || self.emergency || self.field || self.outside || self.defect
+        let outside = self.outside || self.zone || self.release;
+        self.pause || self.button || self.emergency || self.field || outside || self.defect
     }
 }
 
@@ -131,6 +152,8 @@ pub struct Agv {
     pub(crate) motion: Motion,
     pub(crate) actions: Actions,
     pub(crate) maps: Maps,
+    pub(crate) zone_sets: ZoneSets,
+    pub(crate) heeding: Heeding,
     pub(crate) downloads: Downloads,
     pub(crate) errors: Errors,
     pub(crate) holds: Holds,
@@ -142,13 +165,18 @@ pub struct Agv {
     pub(crate) obstacles: BTreeSet<String>,
     /// It has left its corridor and was not put back yet.
     pub(crate) strayed: bool,
+    /// It cannot tell where it is.
+    pub(crate) lost: bool,
     /// Nodes where loads are handed over, and whether one stands there.
     pub(crate) stations: std::collections::BTreeMap<String, bool>,
     pub(crate) charging: bool,
+    /// How far it is on its way to sleep.
+    pub(crate) sleep: hibernation::Hibernation,
     /// A switch keeps it from pausing and from going on.
     pub(crate) pause_blocked: bool,
     /// Something keeps it from ending its charging.
     pub(crate) charger_locked: bool,
+    pub(crate) requests: Requests,
     pub(crate) connection: Connection,
     pub(crate) report: Report,
     /// What it repeats while nothing can change.
@@ -202,6 +230,8 @@ impl Agv {
             motion: Motion::at(pose),
             actions: Actions::default(),
             maps,
+            zone_sets: ZoneSets::default(),
+            heeding: Heeding::default(),
             downloads: Downloads::default(),
             errors: Errors::default(),
             holds: Holds::default(),
@@ -210,10 +240,13 @@ impl Agv {
             loads: Vec::new(),
             obstacles: BTreeSet::new(),
             strayed: false,
+            lost: false,
             stations: config.stations.clone(),
             charging: false,
+            sleep: hibernation::Hibernation::default(),
             pause_blocked: false,
             charger_locked: false,
+            requests: Requests::default(),
             connection: Connection::new(),
             report: Report::default(),
             rest: Rest::default(),
@@ -237,8 +270,10 @@ impl Agv {
             self.motion.end(),
             self.actions.next_end(),
             self.errors.next_end(),
+            self.requests.next_end(self.now.moment),
             self.connection.next_attempt(),
             self.lingers_until,
+            self.sleep.wakes_at,
             self.inbox.front().map(|(due, _)| *due),
             self.due(),
             self.next_report(),
@@ -273,6 +308,7 @@ impl Agv {
             self.stage_finished(&id);
         }
         self.errors.expire(moment);
+        self.wakes_in_time();
         self.happens(hooks::Event::Woken);
         self.lingers_until = self.lingers_until.filter(|until| *until > moment);
         while self.inbox.front().is_some_and(|(due, _)| *due <= moment) {
@@ -286,6 +322,7 @@ impl Agv {
         self.settle();
         self.happens(hooks::Event::Settled);
         self.flush();
+        self.settle_farewell();
         self.rest = Rest::begins(self.comes_to_rest());
     }
 }
@@ -331,14 +368,19 @@ impl Agv {
     }
 
     fn message(&mut self, topic: &str, payload: &[u8]) {
-        for name in ["order", "instantActions"] {
+        for name in HEARD {
             if self.config.topic(name) != Some(topic) || !self.hears(name, payload) {
                 continue;
             }
-            if name == "order" {
-                self.order_received(payload);
-            } else {
-                self.instant_actions_received(payload);
+            let Some(heard) = self.heard_asleep(name, payload) else {
+                continue;
+            };
+            match name {
+                "order" => self.order_received(&heard),
+                "instantActions" => self.instant_actions_received(&heard),
+                "zoneSet" if self.config.listens(name) => self.zone_set_received(&heard),
+                "responses" if self.config.listens(name) => self.responses_received(&heard),
+                _ => {}
             }
         }
     }

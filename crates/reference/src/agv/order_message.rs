@@ -145,6 +145,15 @@ pub(crate) struct Node {
     pub(crate) actions: Vec<ActionRequest>,
 }
 
+/// releaseLossBehavior of a corridor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Loss {
+    /// Stands where it is.
+    Stop,
+    /// Goes back to its trajectory by the way it came.
+    Return,
+}
+
 /// edge.corridor: how far the vehicle may leave its trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Corridor {
@@ -154,6 +163,10 @@ pub(crate) struct Corridor {
     pub(crate) right: f64,
     /// The whole contour has to stay inside, not the kinematic centre alone.
     pub(crate) contour: bool,
+    /// It has to be asked for.
+    pub(crate) release_required: bool,
+    /// What follows when its release is lost on the way.
+    pub(crate) loss: Loss,
 }
 
 impl Corridor {
@@ -166,6 +179,13 @@ impl Corridor {
             left: fields.number_in("leftWidth", 0.0, FARTHEST)?,
             right: fields.number_in("rightWidth", 0.0, FARTHEST)?,
             contour: point == Some(1),
+            release_required: fields.optional("releaseRequired", Fields::boolean)? == Some(true),
+            loss: match fields.optional("releaseLossBehavior", |fields, key| {
+                fields.literal(key, &["STOP", "RETURN"])
+            })? {
+                Some(1) => Loss::Return,
+                _ => Loss::Stop,
+            },
         })
     }
 }

@@ -52,6 +52,8 @@ pub(crate) struct OrderState {
     pub(crate) cancelled: bool,
     /// The order names a zone set.
     pub(crate) zoned: bool,
+    /// Its next node turned out to be out of reach.
+    pub(crate) unreachable: bool,
     /// What the last message of it said.
     pub(crate) content: (Vec<Node>, Vec<Edge>),
     /// lastNodeId and lastNodeSequenceId before the present ones.
@@ -74,6 +76,7 @@ impl OrderState {
             left: (None, None),
             cancelled: false,
             zoned: false,
+            unreachable: false,
             content: (Vec::new(), Vec::new()),
             previous: (String::new(), 0),
         }

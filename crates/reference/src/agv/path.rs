@@ -21,7 +21,7 @@ pub(crate) const HALF_WIDTH: f64 = 0.4;
 pub(crate) const HALF_LENGTH: f64 = 0.6;
 
 /// Nearer to its path than this, the vehicle is on it, in metres.
-const ON_PATH: f64 = 0.02;
+pub(crate) const ON_PATH: f64 = 0.02;
 
 /// How far the ends of a trajectory may lie from the nodes of its edge, in metres, unless the nodes allow more.
 const ENDS: f64 = 0.5;
@@ -45,12 +45,19 @@ impl Agv {
     /// The path over the rest of an edge with a trajectory, from where the vehicle is; `None` on a straight edge.
     pub(crate) fn curve_ahead(&self, edge: &Edge, stop: &Stop) -> Option<Path> {
         let whole = edge.trajectory.as_ref()?.path.clone();
-        let path = match self.detour(edge) {
-            Some(lateral) => beside(&whole, lateral),
-            None => whole,
+        let pose = self.motion.pose(self.moment());
+        // What was granted on the way is driven round from here on.
+        let nearest = whole.beside(pose.x, pose.y);
+        let on_it = nearest.filter(|nearest| self.order.entered && nearest.distance <= ON_PATH);
+        let path = match (self.detour(edge), self.requests.way(edge.sequence_id)) {
+            (Some(_), Some(way)) => way.clone(),
+            (Some(lateral), None) => {
+                let rest = on_it.filter(|_| self.has_to_ask(edge)).map(|on| whole.rest(on.made));
+                beside(rest.as_ref().unwrap_or(&whole), lateral)
+            }
+            (None, _) => whole,
         };
         let path = self.bends(edge, path)?;
-        let pose = self.motion.pose(self.moment());
         let beside = path.beside(pose.x, pose.y)?;
         let rest = if self.order.entered {
             path.rest(beside.made)
@@ -69,7 +76,7 @@ impl Agv {
     }
 
     /// The corridor as the vehicle understands it.
-    fn corridor(&self, edge: &Edge) -> Option<Corridor> {
+    pub(crate) fn corridor(&self, edge: &Edge) -> Option<Corridor> {
         let mut corridor = edge.corridor?;
         self.keeps_to(&mut corridor);
         Some(corridor)
@@ -77,7 +84,13 @@ impl Agv {
 
     /// How far to the left (or, negative, to the right) the vehicle drives round what stands on the edge.
     fn detour(&self, edge: &Edge) -> Option<f64> {
-        let corridor = self.corridor(edge).filter(|_| self.obstacles.contains(&edge.id))?;
+        let drives_round = self.obstacles.contains(&edge.id) && self.may_leave(edge);
+        self.room_beside(edge).filter(|_| drives_round)
+    }
+
+    /// How far to the left (or, negative, to the right) there is room beside an edge.
+    pub(crate) fn room_beside(&self, edge: &Edge) -> Option<f64> {
+        let corridor = self.corridor(edge)?;
         let taken = if corridor.contour { HALF_WIDTH } else { 0.0 };
         let (left, right) = (corridor.left - taken, corridor.right - taken);
         let room = left.max(right) * SHARE;
@@ -112,11 +125,15 @@ impl Agv {
         if beside.distance + taken <= width + OUTSIDE {
             return false;
         }
+        let name = self.config.errors.outside_of_corridor.clone();
+        // Where the version says of its level, that counts.
+        let has_level = self.config.error_rules.contains_key(&name);
+        let references = has_level.then(|| ("edgeId".to_owned(), edge.id.clone()));
         self.strayed = true;
         let error = ActiveError {
-            error_type: self.config.errors.outside_of_corridor.clone(),
-            fatal: true,
-            references: Vec::new(),
+            error_type: name,
+            fatal: !has_level,
+            references: references.into_iter().collect(),
             description: "the vehicle is outside the corridor of its edge".into(),
             life: Life::WhileOutside,
         };
@@ -209,6 +226,9 @@ impl Agv {
 
     /// The path a self-planning vehicle reports for an edge (STATE-14).
     pub(crate) fn planned_path(&self, edge: &Edge) -> Option<Value> {
+        if self.has_paths() {
+            return self.sent_path(edge);
+        }
         if !self.allows(Permission::ReportPath, self.config.plans) {
             return None;
         }

@@ -17,7 +17,7 @@ use super::{motion, way};
 use tck_base::nurbs::Path;
 
 /// An orientation is right within this, in radians.
-const ALIGNED: f64 = 1e-3;
+pub(crate) const ALIGNED: f64 = 1e-3;
 
 /// No orientation is asked for more exactly than this, in radians.
 const EXACT: f64 = 1e-6;
@@ -29,12 +29,15 @@ impl Agv {
     /// Draws all consequences that need no time.
     pub(crate) fn settle(&mut self) {
         for _ in 0..10_000 {
-            let progress = self.watch_corridor()
+            let progress = self.watch_zones()
+                | self.watch_corridor()
+                | self.tend_requests()
                 | self.begin_waiting_instants()
                 | self.begin_triggered()
                 | self.drive()
                 | self.settle_cancel()
-                | self.settle_mode();
+                | self.settle_mode()
+                | self.settle_sleep();
             if !progress {
                 break;
             }
@@ -62,9 +65,10 @@ impl Agv {
         let hindrances = [
             (
                 Hindrance::Mode,
-                !self.mode.takes_orders() || self.awaited_mode.is_some(),
+                !self.mode.takes_orders() || self.awaited_mode.is_some() || self.sleep.awaited.is_some(),
             ),
             (Hindrance::Hold, self.holds.any()),
+            (Hindrance::Lost, self.lost),
             (Hindrance::Cancellation, cancelled),
             (Hindrance::Action, self.actions_forbid_driving()),
         ];
@@ -99,9 +103,13 @@ impl Agv {
 
     /// Goes on towards the next node.
     fn set_out(&mut self, stop: &Stop) -> bool {
+        if self.drive_back() {
+            return true;
+        }
         let edge = self.order.edge_ahead().cloned();
         let blocked = edge.as_ref().is_some_and(|edge| self.is_blocked(edge));
-        if blocked || !self.allows(Permission::SetOut(stop), true) {
+        let given_up = self.order.unreachable && !self.allows(Permission::TryAgain, false);
+        if blocked || given_up || !self.allows(Permission::SetOut(stop), true) {
             return false;
         }
         let pose = self.motion.pose(self.moment());
@@ -125,7 +133,10 @@ impl Agv {
         if distance < NOWHERE {
             self.motion.reached = true;
         } else if aligned {
-            self.roll(edge.as_ref(), stop, (distance, backwards), curve);
+            if let Some((edge, way)) = edge.as_ref().zip(curve.as_ref()) {
+                self.takes_way(edge, way);
+            }
+            return self.roll(edge.as_ref(), stop, (distance, backwards), curve);
         } else {
             self.turn_to(theta, edge.as_ref());
         }

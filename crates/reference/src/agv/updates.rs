@@ -58,7 +58,7 @@ impl Agv {
             Origin::Node(id) | Origin::Edge(id) => {
                 gone.contains(&id) && self.allows(Permission::ForgetWithHorizon, true)
             }
-            Origin::Instant => false,
+            Origin::Instant | Origin::Zone(_) => false,
         };
         let forgotten: Vec<String> = self.actions.iter().filter(of_horizon).map(Action::id).collect();
         self.actions.retain(|action| !forgotten.contains(&action.request.id));

@@ -70,22 +70,34 @@ pub(crate) fn is_backwards(edge: &Edge, heading: f64) -> bool {
 }
 
 impl Agv {
-    /// Rolls towards a node; the actions of an edge that stop the vehicle do so a little way from its begin.
+    /// Rolls towards a node; the actions of an edge that stop the vehicle do so a little way from its begin. Whether it does, or has
+    /// just found that it may not.
     pub(crate) fn roll(
         &mut self,
         edge: Option<&Edge>,
         stop: &Stop,
         (distance, backwards): (f64, bool),
         curve: Option<Path>,
-    ) {
-        let leg = self.leg(edge, stop, distance, backwards);
+    ) -> bool {
+        let mut leg = self.leg(edge, stop, distance, backwards);
         let moment = self.moment();
         let pose = self.motion.pose(moment);
-        let speed = leg.permitted.map_or(leg.own, |permitted| permitted.min(leg.own));
+        let mut speed = leg.permitted.map_or(leg.own, |permitted| permitted.min(leg.own));
+        if self.config.heeds_zones() {
+            let way = curve.clone();
+            let way = way.unwrap_or_else(|| Path::through([(pose.x, pose.y), (stop.place.x, stop.place.y)]));
+            let Some((free, limit)) = self.way_in_zones(edge, &way.first(leg.way), leg.facing, &pose.map_id) else {
+                return self.give_up_node(stop);
+            };
+            if free < leg.way {
+                (leg.way, leg.to_node) = (free, false);
+            }
+            speed = speed.min(limit);
+        }
         if let Some(curve) = curve {
             let part = curve.first(leg.way);
             self.motion.follow(moment, part, speed, leg.facing, leg.to_node);
-            return;
+            return true;
         }
         let (x, y) = (stop.place.x, stop.place.y);
         let part = leg.way / distance;
@@ -95,6 +107,7 @@ impl Agv {
             (x, y)
         };
         self.motion.roll(moment, to, speed, backwards, leg.to_node);
+        true
     }
 
     fn leg<'a>(&self, edge: Option<&Edge>, stop: &'a Stop, distance: f64, backwards: bool) -> Leg<'a> {

@@ -20,12 +20,26 @@ impl Agv {
         if topic == "order" && self.config.names.lacks(Edge::start_node_id) {
             name_ends(&mut message);
         }
+        if topic == "order" && !self.config.has("corridorRelease") {
+            forget_releases(&mut message);
+        }
         message
     }
 
     /// The path of a member of an order, as the version writes it.
     pub(crate) fn spelled_path(&self, path: &str) -> String {
         self.config.names.spelled_path(Topic::Order.object(), path)
+    }
+}
+
+/// Leaves aside what a version does not know of corridors.
+fn forget_releases(order: &mut Value) {
+    let edges = order.get_mut("edges").and_then(Value::as_array_mut);
+    for edge in edges.into_iter().flatten() {
+        if let Some(Value::Object(corridor)) = edge.get_mut("corridor") {
+            corridor.remove("releaseRequired");
+            corridor.remove("releaseLossBehavior");
+        }
     }
 }
 

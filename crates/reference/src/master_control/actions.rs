@@ -10,7 +10,7 @@ use super::seen::ActionOffer;
 use super::vehicle::Vehicle;
 
 /// Where the table of predefined actions allows each (ACT-08).
-const SCOPES: [(&str, &[&str]); 17] = [
+const SCOPES: &[(&str, &[&str])] = &[
     ("startPause", &["INSTANT"]),
     ("stopPause", &["INSTANT"]),
     ("startCharging", &["INSTANT", "NODE"]),
@@ -19,6 +19,9 @@ const SCOPES: [(&str, &[&str]); 17] = [
     ("enableMap", &["INSTANT", "NODE"]),
     ("downloadMap", &["INSTANT"]),
     ("deleteMap", &["INSTANT"]),
+    ("downloadZoneSet", &["INSTANT"]),
+    ("enableZoneSet", &["INSTANT", "NODE"]),
+    ("deleteZoneSet", &["INSTANT"]),
     ("stateRequest", &["INSTANT"]),
     ("logReport", &["INSTANT"]),
     ("pick", &["NODE", "EDGE"]),
@@ -28,17 +31,48 @@ const SCOPES: [(&str, &[&str]); 17] = [
     ("waitForTrigger", &["NODE"]),
     ("cancelOrder", &["INSTANT"]),
     ("factsheetRequest", &["INSTANT"]),
+    ("startHibernation", &["INSTANT"]),
+    ("stopHibernation", &["INSTANT"]),
+    ("shutdown", &["INSTANT"]),
+    ("clearInstantActions", &["INSTANT", "NODE"]),
+    ("clearZoneActions", &["INSTANT", "NODE"]),
+    ("trigger", &["INSTANT"]),
+    ("retry", &["INSTANT"]),
+    ("skipRetry", &["INSTANT"]),
+    ("updateCertificate", &["INSTANT"]),
+];
+
+/// Actions that only versions with a feature have.
+const SINCE: &[(&str, &str)] = &[
+    ("startHibernation", "hibernation"),
+    ("stopHibernation", "hibernation"),
+    ("shutdown", "hibernation"),
+    ("clearInstantActions", "instantActionStates"),
+    ("clearZoneActions", "zones"),
+    ("trigger", "triggers"),
+    ("retry", "retry"),
+    ("skipRetry", "retry"),
+    ("updateCertificate", "certificates"),
 ];
 
 /// Parameters the text demands, whatever the factsheet says (ACT-31).
-const MANDATORY: [(&str, &[&str]); 7] = [
+const MANDATORY: &[(&str, &[&str])] = &[
     ("initPosition", &["x", "y", "theta", "mapId", "lastNodeId"]),
     ("enableMap", &["mapId", "mapVersion"]),
     ("downloadMap", &["mapId", "mapVersion", "mapDownloadLink"]),
     ("deleteMap", &["mapId", "mapVersion"]),
+    ("downloadZoneSet", &["zoneSetId", "zoneSetDownloadLink"]),
+    ("enableZoneSet", &["zoneSetId"]),
+    ("deleteZoneSet", &["zoneSetId"]),
     ("logReport", &["reason"]),
     ("pick", &["stationType", "loadType"]),
     ("waitForTrigger", &["triggerType"]),
+    ("retry", &["actionId"]),
+    ("skipRetry", &["actionId"]),
+    (
+        "updateCertificate",
+        &["service", "keyDownloadLink", "certificateDownloadLink"],
+    ),
 ];
 
 impl Site {
@@ -54,7 +88,7 @@ impl Site {
                     // cancelOrder and the pauses are obligatory, so that a factsheet without them has forgotten them.
                     || (offer.is_none() && kind == "cancelOrder")
             }
-            None => predefined.is_some(),
+            None => predefined.is_some() && knows(vehicle, kind),
         };
         self.allows(vehicle, Permission::Offer(kind, scope), usual)
     }
@@ -71,11 +105,11 @@ impl Site {
         let mut parameters = Map::new();
         for (key, value) in given.as_object().into_iter().flatten() {
             let known = listed.is_none_or(|list| list.iter().any(|parameter| parameter.key == *key));
-            if (known || mandatory(kind).contains(&key.as_str())) && !value.is_null() {
+            if (known || demanded(vehicle, kind).contains(&key.as_str())) && !value.is_null() {
                 parameters.insert(key.clone(), value.clone());
             }
         }
-        let demanded = mandatory(kind).iter().map(|key| (*key, "STRING"));
+        let demanded = demanded(vehicle, kind).iter().map(|key| (*key, "STRING"));
         let required = listed.into_iter().flatten();
         let required = required.filter(|parameter| parameter.is_optional != Some(true));
         let required = required.map(|parameter| (parameter.key.as_str(), parameter.value_data_type.as_str()));
@@ -92,7 +126,7 @@ impl Site {
         let mut action = json!({
             "actionType": kind,
             "actionId": self.next_id(vehicle, "action"),
-            "blockingType": blocking(offer),
+            "blockingType": if instant && vehicle.config.has("instantActionsNeverBlock") { "NONE".to_owned() } else { blocking(offer) },
         });
         if !parameters.is_empty() {
             let list = parameters.into_iter();
@@ -112,6 +146,7 @@ impl Site {
                 let listed = vehicle.factsheet.as_ref().and_then(|sheet| sheet.load_types.first());
                 json!(listed.unwrap_or(&self.config.load_type))
             }
+            ("triggerType", _) if vehicle.config.has("triggers") => json!(["LOCAL"]),
             ("triggerType", _) => json!("button"),
             ("reason", _) => json!("requested"),
             ("duration", _) | (_, "NUMBER" | "FLOAT") => json!(1.0),
@@ -140,9 +175,23 @@ fn blocking(offer: Option<&ActionOffer>) -> String {
     let known = || {
         listed
             .iter()
-            .find(|kind| matches!(kind.as_str(), "NONE" | "SOFT" | "HARD"))
+            .find(|kind| matches!(kind.as_str(), "NONE" | "SINGLE" | "SOFT" | "HARD"))
     };
     wanted.or_else(known).map_or("HARD", String::as_str).to_owned()
+}
+
+/// Whether the version of a vehicle has a predefined action.
+fn knows(vehicle: &Vehicle, kind: &str) -> bool {
+    let since = SINCE.iter().find(|(name, _)| *name == kind);
+    since.is_none_or(|(_, feature)| vehicle.config.has(feature))
+}
+
+/// The parameters that the version of a vehicle demands.
+fn demanded(vehicle: &Vehicle, kind: &str) -> &'static [&'static str] {
+    match kind {
+        "pick" if vehicle.config.has("optionalLoadParameters") => &[],
+        _ => mandatory(kind),
+    }
 }
 
 /// The parameters the text demands.

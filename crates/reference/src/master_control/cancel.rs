@@ -3,7 +3,7 @@
 //! Where the vehicle stands after that, and how the next order begins there, stands in `ways` (the ruling of
 //! ORD-CANCEL-17).
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::Site;
 use super::hooks::{Event, Permission};
@@ -24,7 +24,13 @@ impl Site {
         if !sends {
             return;
         }
-        if let Some(action_id) = self.instant(vehicle, "cancelOrder", &Value::Null) {
+        let order_id = vehicle.running.as_ref().map(|running| running.id.clone());
+        let named = if vehicle.config.has("cancelByOrderId") {
+            json!({ "orderId": order_id })
+        } else {
+            Value::Null
+        };
+        if let Some(action_id) = self.instant(vehicle, "cancelOrder", &named) {
             vehicle.cancel = Some(Cancel { action_id, then });
             self.happens(vehicle, &mut Event::CalledOff);
         }
@@ -64,6 +70,10 @@ impl Site {
         } else {
             // It could not be called off, and is driven to its end.
             vehicle.queue.extend(cancel.then);
+            if let Some(running) = &mut vehicle.running {
+                // Nothing more is released of what was called off (ORD-CANCEL-22).
+                running.refused |= vehicle.config.has("strictUpdates");
+            }
         }
         self.happens(vehicle, &mut Event::CancelOver);
     }

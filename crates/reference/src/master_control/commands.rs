@@ -1,7 +1,7 @@
 //! What people and tests ask of the master control; each leads to an order (section 6.6), an instant action (6.9) or a
 //! map (6.7).
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::config::SiteMap;
 use super::vehicle::{Transport, Vehicle};
@@ -11,8 +11,9 @@ use super::{MasterControl, Site};
 ///
 /// All but the last four take `vehicle`, a serial number; without it the first vehicle is meant. `dispatch {from, to,
 /// loadType, action, parameters}`, `reroute {to}`, `instant-action {action, parameters}`, `init-position {nodeId}` or
-/// `{x, y, theta, mapId, lastNodeId}`, `download-map {mapId, mapVersion, mapDownloadLink, mapHash}`, `enable-map` and
-/// `delete-map {mapId, mapVersion}`, `block-edge` and `unblock-edge {from, to}`, `configure {what}` with what it is to do
+/// `{x, y, theta, mapId, lastNodeId}`, `update-certificate {service, keyDownloadLink, certificateDownloadLink}`, `download-map {mapId, mapVersion, mapDownloadLink, mapHash}`, `enable-map` and
+/// `delete-map {mapId, mapVersion}`, `distribute-zones {what, nodeId}`, `download-zones {mapId, zoneSetId, zoneSetDownloadLink}`,
+/// `answer-requests {how}`, `revoke-grant {requestId}`, `block-edge` and `unblock-edge {from, to}`, `configure {what}` with what it is to do
 /// otherwise; the others take nothing.
 pub const COMMANDS: &[&str] = &[
     "dispatch",
@@ -21,12 +22,21 @@ pub const COMMANDS: &[&str] = &[
     "pause",
     "resume",
     "instant-action",
+    "retry",
+    "skip-retry",
+    "give-trigger",
+    "update-certificate",
     "request-factsheet",
     "request-state",
     "init-position",
     "download-map",
     "enable-map",
     "delete-map",
+    "distribute-zones",
+    "withdraw-zones",
+    "download-zones",
+    "answer-requests",
+    "revoke-grant",
     "block-edge",
     "unblock-edge",
     "configure",
@@ -104,6 +114,12 @@ impl Site {
                 self.instant(vehicle, "stateRequest", &Value::Null);
             }
             "instant-action" => self.instant_asked(vehicle, arguments),
+            "retry" => self.decide_retriable(vehicle, "retry"),
+            "skip-retry" => self.decide_retriable(vehicle, "skipRetry"),
+            "give-trigger" => {
+                self.instant(vehicle, "trigger", &Value::Null);
+            }
+            "update-certificate" => self.update_certificate(vehicle, arguments),
             "init-position" => self.init_position(vehicle, arguments),
             "download-map" => {
                 if let Some(map) = self.map_named(arguments) {
@@ -116,6 +132,11 @@ impl Site {
                     self.map_action(vehicle, kind, &map_id, &version);
                 }
             }
+            "distribute-zones" => self.distribute_zones(vehicle, arguments),
+            "withdraw-zones" => self.withdraw_zones(vehicle),
+            "download-zones" => self.download_zones(vehicle, arguments),
+            "answer-requests" => self.answer_otherwise(&text("how").unwrap_or_default()),
+            "revoke-grant" => self.revoke(vehicle, text("requestId").as_deref()),
             "block-edge" if vehicle.blocked.len() < MAX_BLOCKED => {
                 if let Some((from, to)) = pair("from", "to") {
                     self.block(vehicle, &from, &to);
@@ -156,6 +177,16 @@ impl Site {
                 self.instant(vehicle, &kind, &parameters);
             }
         }
+    }
+
+    /// Has the vehicle fetch a certificate, over a link that nobody can read along (CERT-05).
+    fn update_certificate(&mut self, vehicle: &mut Vehicle, arguments: &Value) {
+        let link = |key: &str| text(arguments, key).filter(|link| link.starts_with("https://"));
+        let links = (link("keyDownloadLink"), link("certificateDownloadLink"));
+        let (Some(key), Some(certificate)) = links else { return };
+        let service = text(arguments, "service").unwrap_or_else(|| "MQTT".into());
+        let given = json!({ "service": service, "keyDownloadLink": key, "certificateDownloadLink": certificate });
+        self.instant(vehicle, "updateCertificate", &given);
     }
 
     /// The map of a command, completed from the maps of the site.

@@ -6,8 +6,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
+use serde_json::Value;
+use tck_view::{Names, Topic};
+
 /// One vehicle of the fleet.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct VehicleConfig {
     /// Manufacturer as in the header.
     pub manufacturer: String,
@@ -17,6 +20,10 @@ pub struct VehicleConfig {
     pub version: String,
     /// Features of this version, by the names the packs use: `mapActions`, `factsheetRequest`, `corridors`.
     pub features: BTreeSet<String>,
+    /// What this version calls the members of messages: the master control thinks by their usual names.
+    pub names: Names,
+    /// How many digits a timestamp has behind the second.
+    pub timestamp_digits: usize,
     /// Full topic by topic name. A topic that is missing is neither subscribed nor published.
     pub topics: BTreeMap<String, String>,
 }
@@ -111,6 +118,8 @@ pub struct MasterControlConfig {
     pub station_type: String,
     /// loadType where none is asked for.
     pub load_type: String,
+    /// For how long something is given that a vehicle asks for; for good if nothing is said.
+    pub lease: Option<Duration>,
 }
 
 impl Default for MasterControlConfig {
@@ -134,6 +143,7 @@ impl Default for MasterControlConfig {
             low_battery: 15.0,
             station_type: "floor".into(),
             load_type: "EPAL".into(),
+            lease: Some(Duration::from_secs(20)),
         }
     }
 }
@@ -171,6 +181,33 @@ impl VehicleConfig {
     /// Whether the protocol version it is spoken to in has a feature.
     pub(crate) fn has(&self, feature: &str) -> bool {
         self.features.contains(feature)
+    }
+
+    /// A message for the vehicle, as its version writes it.
+    pub(crate) fn spell(&self, topic: &str, message: &mut Value) {
+        self.names.spell(Topic::of_name(topic).object(), message);
+    }
+
+    /// A message of the vehicle, by the usual names.
+    pub(crate) fn understand(&self, topic: &str, message: &mut Value) {
+        self.names.unspell(Topic::of_name(topic).object(), message);
+    }
+
+    /// The usual path of an optional parameter, such as `order.edges.maxSpeed`, that the factsheet of the vehicle calls as its
+    /// version does; `None` if the version has no such member.
+    pub(crate) fn usual_parameter(&self, own: &str) -> Option<String> {
+        let (topic, path) = own.split_once('.')?;
+        let depth = path.split('.').count();
+        let nested = |inner: Value, name: &str| Value::Object([(name.to_owned(), inner)].into_iter().collect());
+        let mut message = path.rsplit('.').fold(Value::Null, nested);
+        self.understand(topic, &mut message);
+        let mut usual = vec![topic.to_owned()];
+        let mut here = &message;
+        while let Some((name, inner)) = here.as_object().and_then(|members| members.iter().next()) {
+            usual.push(name.clone());
+            here = inner;
+        }
+        (usual.len() == depth + 1).then(|| usual.join("."))
     }
 }
 

@@ -98,7 +98,11 @@ impl Site {
         let Some(state) = &vehicle.state else { return false };
         let free = state.route_empty() || self.allows(vehicle, Permission::Interrupt, false);
         let fit = self.allows(vehicle, Permission::Fit, state.is_fit(self.config.low_battery));
-        if !free || !fit || !self.allows(vehicle, Permission::Begin, true) {
+        let level = vehicle.factsheet.as_ref().and_then(|sheet| sheet.critical_charge);
+        let charges = |transport: &Transport| transport.action.as_deref() == Some("startCharging");
+        let empty = state.is_critical(level) && !vehicle.queue.front().is_some_and(charges);
+        let fit = fit && !self.allows(vehicle, Permission::Starve, empty);
+        if !free || !fit || !self.zones_ready(vehicle) || !self.allows(vehicle, Permission::Begin, true) {
             return false;
         }
         let waits = |kind: &str| matches!(kind, "initPosition" | "stopCharging");

@@ -6,7 +6,7 @@
 use super::Site;
 use super::hooks::{Event, Fate, Measure, Occasion, Permission};
 use super::order::Window;
-use super::seen::State;
+use super::seen::{ErrorSeen, State};
 use super::vehicle::{Running, Transport, Vehicle};
 
 /// A transport is not begun more often than this.
@@ -29,6 +29,9 @@ impl Site {
         let mut fate = self.fate(vehicle, &mut running, &state);
         if fate == Fate::Runs && running.confirmed && !running.refused {
             fate = self.supervise_trigger(vehicle, &mut running, &state);
+        }
+        if fate == Fate::Runs && self.is_stuck(vehicle, &running, &state) {
+            fate = Fate::CalledOff;
         }
         let fate = self.judges(vehicle, &mut running, &state, fate);
         vehicle.state = Some(state);
@@ -61,10 +64,10 @@ impl Site {
             running.confirmed |= state.order_update_id >= running.update_id;
         }
         if !running.confirmed && !running.refused {
-            let refusal = refusal(running, state).map(str::to_ascii_lowercase);
+            let refusal = refusal(running, state).map(|kind| kind.replace('_', "").to_ascii_lowercase());
             match refusal {
                 Some(_) if running.accepted => running.refused = true,
-                Some(kind) if kind.contains("noroute") && running.transport.begun < 2 => return Fate::Again,
+                Some(kind) if misplaced(&kind) && running.transport.begun < 2 => return Fate::Again,
                 None if self.send_again(vehicle, running) => {}
                 None if running.accepted => running.refused = true,
                 Some(_) | None => return Fate::Over,
@@ -108,7 +111,10 @@ impl Site {
 
     /// Extends the base before the vehicle has to halt at its end (ORD-UPD-02).
     pub(crate) fn extend_base(&mut self, vehicle: &mut Vehicle, running: &mut Running) {
-        if vehicle.state.is_none() || !self.allows(vehicle, Permission::Extend(running), true) {
+        let Some(state) = &vehicle.state else { return };
+        // Somebody has to bring it back into its corridor first (CORR-23).
+        let outside = vehicle.config.has("requests") && state.has_error("OUTSIDE_OF_CORRIDOR");
+        if !self.allows(vehicle, Permission::Extend(running), !outside) {
             return;
         }
         self.happens(vehicle, &mut Event::Extending(running));
@@ -158,6 +164,17 @@ impl Site {
         }
     }
 
+    /// Whether the vehicle says that it cannot come to a node that is left (ZERR-03).
+    fn is_stuck(&self, vehicle: &Vehicle, running: &Running, state: &State) -> bool {
+        let told = |error: &ErrorSeen| {
+            let ahead = running.stops.iter().skip(running.reached(Some(state)) + 1);
+            let named = error.reference("nodeId");
+            error.is("NODE_UNREACHABLE") && named.is_none_or(|id| ahead.map(|stop| &stop.id).any(|stop| stop == id))
+        };
+        let usual = vehicle.config.has("zones") && running.accepted && state.errors.iter().any(told);
+        usual && self.allows(vehicle, Permission::GiveUp, usual)
+    }
+
     /// Calls the order off when a trigger does not come in time (ACT-39).
     fn supervise_trigger(&mut self, vehicle: &mut Vehicle, running: &mut Running, state: &State) -> Fate {
         if !self.allows(vehicle, Permission::Supervise(running), true) {
@@ -184,6 +201,11 @@ impl Site {
         vehicle.at(due);
         Fate::Runs
     }
+}
+
+/// Whether an error says that an order does not begin where the vehicle stands.
+fn misplaced(kind: &str) -> bool {
+    kind.contains("noroute") || kind.contains("startnodeoutofrange")
 }
 
 /// The transport as it is still to be done.

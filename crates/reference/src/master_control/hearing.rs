@@ -30,6 +30,7 @@ impl MasterControl {
             payload,
             message: serde_json::from_slice(payload).unwrap_or_default(),
         };
+        vehicle.config.understand(name, &mut heard.message);
         if !self.site.hears(vehicle, &mut heard) {
             return;
         }
@@ -46,7 +47,7 @@ impl MasterControl {
                 }
             }
             "factsheet" => {
-                vehicle.factsheet = Some(Factsheet::read(&message));
+                vehicle.factsheet = Some(Factsheet::read(&message, |own| vehicle.config.usual_parameter(own)));
                 vehicle.missed = None;
                 self.site.happens(vehicle, &mut Event::Factsheet);
             }
@@ -76,10 +77,16 @@ impl Site {
         let presence = match told {
             Some("ONLINE") => Presence::Online,
             Some("OFFLINE" | "CONNECTIONBROKEN") => Presence::Away,
+            Some("HIBERNATING") => Presence::Asleep,
             _ => return,
         };
         let before = std::mem::replace(&mut vehicle.presence, presence);
-        if presence == Presence::Away {
+        if presence == Presence::Asleep {
+            // It has given its order up before (HIB-04).
+            if let Some(running) = vehicle.running.as_mut().filter(|running| running.accepted) {
+                running.cleared = true;
+            }
+        } else if presence == Presence::Away {
             self.happens(vehicle, &mut Event::Away(told == Some("CONNECTIONBROKEN"), before));
         } else {
             if before != Presence::Online {
@@ -91,9 +98,14 @@ impl Site {
 
     fn state_heard(&mut self, vehicle: &mut Vehicle, state: State) {
         let back = vehicle.state.as_ref().is_some_and(|before| !before.takes_orders()) && state.takes_orders();
-        // A vehicle in MANUAL gives up the order it has (MODE-02).
+        // A vehicle in MANUAL gives up the order it has (MODE-02), and in later versions in other modes, too.
+        let all = vehicle.config.has("modesClear");
         if let Some(running) = vehicle.running.as_mut().filter(|running| running.accepted) {
-            running.cleared |= state.operating_mode == "MANUAL";
+            running.cleared |= match state.operating_mode.as_str() {
+                "MANUAL" => true,
+                "STARTUP" | "SERVICE" | "TEACHIN" => all,
+                _ => false,
+            };
         }
         let before = vehicle.state.replace(state);
         vehicle.state_at = self.now.moment;

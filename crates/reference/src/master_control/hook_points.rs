@@ -7,6 +7,7 @@ use serde_json::{Map, Value};
 use super::config::SiteMap;
 use super::dispatch::Way;
 use super::order::Window;
+use super::requests::Claim;
 use super::rerouting::Reroute;
 use super::seen::State;
 use super::vehicle::{Leg, MapJob, Presence, Running, Stop, Transport};
@@ -34,6 +35,12 @@ pub(crate) enum Permission<'a> {
     Gone,
     /// The vehicle is well enough for new work.
     Fit,
+    /// A transport has to wait because the battery is too low for it (FACT-17).
+    Starve,
+    /// A sleeping vehicle is woken (HIB-13).
+    Wake,
+    /// A list of actions is emptied by this action (IACT-STATE-07).
+    Clear(&'a str),
     /// A new order is begun.
     Begin,
     /// A new order is begun although the way of the last one is not driven to its end.
@@ -58,6 +65,24 @@ pub(crate) enum Permission<'a> {
     CancelEnded,
     /// The order called off is not driven any more.
     OrderGone,
+    /// The vehicle is given zones at all (ZSET-25).
+    GiveZones,
+    /// A set is sent on its topic, and not fetched (ZSET-02).
+    SendZones,
+    /// It is given zones of this type (ZSET-25).
+    ZoneType,
+    /// A set that is known has this content, and is used for it (ZSET-06).
+    SameSet(&'a Value, &'a Value),
+    /// A set that is on board is enabled (ZSET-08).
+    EnableZones,
+    /// Orders may rely on the zones of the vehicle (ZSET-08).
+    ZonesReady,
+    /// A claim of another vehicle keeps a zone from being given (ZREQ-17, ZREQ-18).
+    Occupied(&'a Claim),
+    /// A grant is prolonged (REQ-11).
+    Prolong,
+    /// An order is called off because the vehicle cannot come to a node of it (ZERR-03).
+    GiveUp,
 }
 
 /// Something that has a length in time.
@@ -67,6 +92,8 @@ pub(crate) enum Span {
     Interval(Occasion),
     /// Until something is taken for lost.
     Lost,
+    /// For which something is given that a vehicle asks for; for good if it is nothing.
+    Lease,
 }
 
 /// Why an order message is sent.
@@ -103,6 +130,8 @@ pub(crate) enum Measure<'a> {
     Base(&'a Running, usize, bool),
     /// Index behind the last node that can be released.
     Free,
+    /// Zones of one set (ZSET-27).
+    Zones,
 }
 
 /// Something has happened, or is about to; what is mutable can be changed.

@@ -12,6 +12,7 @@ use super::Site;
 use super::config::MasterControlConfig;
 use super::dispatch::Way;
 use super::order::Window;
+use super::requests::{Claim, Grant};
 use super::seen::State;
 use super::vehicle::{Running, Transport, Vehicle};
 use super::ways::Pose;
@@ -56,7 +57,9 @@ hooks! {
     mut shows of vehicle (vehicle: &mut Vehicle, running: &Running, window: &mut Window, free: usize) = each;
     /// What has become of the running order.
     mut judges of vehicle (vehicle: &mut Vehicle, running: &mut Running, state: &State, fate: Fate) -> Fate = fold(fate);
-    /// An id is given, of a kind: order, action, place, way.
+    /// What is said to a request of the vehicle that has no final answer yet; `None` if nothing.
+    mut decides of vehicle (vehicle: &mut Vehicle, claim: &Claim, usual: Option<Grant>) -> Option<Grant> = fold(usual);
+    /// An id is given, of a kind: order, action, place, way, zones.
     mut names of vehicle (vehicle: &Vehicle, what: &str, id: &mut String) = each;
     /// An action is made with the parameters that were handed over: an instant action, or one of an order.
     mut makes of vehicle (vehicle: &Vehicle, action: &mut Object, given: &Value, instant: bool) = each;

@@ -6,8 +6,9 @@ use serde_json::{Value, json};
 
 use super::Site;
 use super::hooks::{Event, Measure, Permission};
-use super::seen::ActionState;
-use super::vehicle::{Instant, MAX_INSTANT, Vehicle};
+use super::seen::{ActionState, State};
+use super::vehicle::{Instant, MAX_INSTANT, Presence, Vehicle};
+use super::zones::WantedSet;
 
 /// Instant actions that do not go together with an order that is driven (IACT-02).
 const AGAINST_ORDER: [&str; 4] = ["initPosition", "startCharging", "stopCharging", "finePositioning"];
@@ -56,7 +57,10 @@ impl Site {
         });
         let limit = self.measures(vehicle, Measure::Instants, limit).clamp(1, 10);
         let waits = |instant: &Instant| instant.sent_at.is_none();
-        let told = |instant: &Instant| self.allows(vehicle, Permission::Tell(instant.kind()), commandable);
+        let told = |instant: &Instant| {
+            let usual = commandable || self.takes(vehicle, instant.kind());
+            self.allows(vehicle, Permission::Tell(instant.kind()), usual)
+        };
         let ready: Vec<bool> = vehicle.instants.iter().map(|one| waits(one) && told(one)).collect();
         let mut actions = Vec::new();
         for (instant, _) in vehicle.instants.iter_mut().zip(ready).filter(|(_, ready)| *ready) {
@@ -66,6 +70,65 @@ impl Site {
         for actions in actions.chunks(limit) {
             self.publish(vehicle, "instantActions", &json!({ "actions": actions }));
             vehicle.at(self.lost_after(vehicle, now));
+        }
+    }
+
+    /// Whether a vehicle that cannot be commanded takes this all the same: asleep it can be woken (HIB-06), and an order can be
+    /// called off while somebody works on the vehicle (MODE-11).
+    fn takes(&self, vehicle: &Vehicle, kind: &str) -> bool {
+        let intervened = vehicle
+            .state
+            .as_ref()
+            .is_some_and(|state| state.operating_mode == "INTERVENED");
+        match kind {
+            "stopHibernation" => vehicle.presence == Presence::Asleep,
+            "cancelOrder" => intervened && self.reachable(vehicle),
+            _ => false,
+        }
+    }
+
+    /// Wakes a sleeping vehicle for what waits to be done (HIB-13, SHUT-03).
+    pub(super) fn watch_sleep(&mut self, vehicle: &mut Vehicle) {
+        let woken = vehicle
+            .instants
+            .iter()
+            .any(|instant| instant.kind() == "stopHibernation");
+        let waits = vehicle.instants.iter().any(|instant| instant.sent_at.is_none());
+        let needed = vehicle.presence == Presence::Asleep && !woken && (waits || !vehicle.queue.is_empty());
+        if self.allows(vehicle, Permission::Wake, needed) {
+            self.instant(vehicle, "stopHibernation", &Value::Null);
+        }
+    }
+
+    /// Has the lists of instant actions and of actions in zones emptied once all in them has ended (IACT-STATE-07, ZACT-STATE-08).
+    pub(super) fn watch_lists(&mut self, vehicle: &mut Vehicle) {
+        let Some(state) = &vehicle.state else { return };
+        if !vehicle.config.has("instantActionStates") || !vehicle.instants.is_empty() || !vehicle.awaited().is_empty() {
+            return;
+        }
+        let lists = [
+            ("clearInstantActions", &state.instant_action_states),
+            ("clearZoneActions", &state.zone_action_states),
+        ];
+        let full = lists.into_iter().filter(|(kind, list)| {
+            // What clears the list may stand in it itself.
+            let others = list.iter().any(|action| action.action_type != *kind);
+            others && list.iter().all(ActionState::is_terminal)
+        });
+        let full: Vec<&str> = full.map(|(kind, _)| kind).collect();
+        for kind in full {
+            if self.commandable(vehicle) && self.allows(vehicle, Permission::Clear(kind), true) {
+                self.instant(vehicle, kind, &Value::Null);
+            }
+        }
+    }
+
+    /// Says what becomes of an action that has failed and may be tried again (RETRY-08).
+    pub(crate) fn decide_retriable(&mut self, vehicle: &mut Vehicle, kind: &str) {
+        let state = vehicle.state.as_ref();
+        let id = state.and_then(State::retriable).map(|action| action.action_id.clone());
+        if let Some(id) = id {
+            self.instant(vehicle, kind, &json!({ "actionId": id }));
         }
     }
 
@@ -117,7 +180,13 @@ impl Vehicle {
     fn awaited(&self) -> Vec<String> {
         let cancel = self.cancel.iter().map(|cancel| &cancel.action_id);
         let jobs = self.jobs.iter().map(|job| &job.action_id);
-        cancel.chain(jobs).chain(self.enabling.values()).cloned().collect()
+        let sets = self.zone_sets.iter().flat_map(WantedSet::awaited);
+        cancel
+            .chain(jobs)
+            .chain(self.enabling.values())
+            .chain(sets)
+            .cloned()
+            .collect()
     }
 
     /// How an instant action ended: `Some(true)` FINISHED, `Some(false)` FAILED or lost for good.

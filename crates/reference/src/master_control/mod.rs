@@ -6,7 +6,8 @@
 //! 6.10, 6.14, 6.15) into the picture of `vehicle`; `driving` sees from it that the order was accepted, extends the base
 //! before the vehicle has to halt (6.6.2), sends again what was lost, and sees the end. `rerouting` changes the way that
 //! is not released yet, `cancel` calls an order off and waits for the end of that (6.6.3). `instant` sends instant
-//! actions (6.9), made in `actions` (6.8); `maps` rolls maps out (6.7). `connecting` is its link to the broker.
+//! actions (6.9), made in `actions` (6.8); `maps` rolls maps out (6.7). `zones` gives vehicles the zones of the floor, and
+//! `requests` answers what they ask for there. `connecting` is its link to the broker.
 //!
 //! `hooks` is where it can be made to behave otherwise; this room knows nothing of how.
 
@@ -25,12 +26,14 @@ pub(crate) mod layout;
 pub(crate) mod maps;
 pub(crate) mod order;
 mod publish;
+pub(crate) mod requests;
 pub(crate) mod rerouting;
 pub(crate) mod seen;
 #[cfg(test)]
 pub(crate) mod tests;
 pub(crate) mod vehicle;
 pub(crate) mod ways;
+pub(crate) mod zones;
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
@@ -43,6 +46,7 @@ pub use config::{MasterControlConfig, SiteEdge, SiteMap, SiteNode, VehicleConfig
 
 use connecting::Connection;
 use hooks::{Event, Hook, Measure, Permission, SwitchedOn};
+use requests::Claims;
 use vehicle::Vehicle;
 
 /// More messages than this do not lie about unread.
@@ -60,6 +64,10 @@ pub(crate) struct Site {
     pub(crate) session: u64,
     /// Counts ids.
     pub(crate) ids: u64,
+    /// What the vehicles ask for.
+    pub(crate) claims: Claims,
+    /// The sets of zones there are, without header.
+    pub(crate) zone_sets: Vec<serde_json::Value>,
     /// Outputs that are still to be handed to the driver.
     pub(crate) pending: Vec<Output>,
 }
@@ -112,10 +120,14 @@ impl Site {
         self.happens(vehicle, &mut Event::Looked);
         self.miss_factsheet(vehicle);
         self.watch_instants(vehicle);
+        self.watch_lists(vehicle);
+        self.watch_sleep(vehicle);
         self.watch_maps(vehicle);
+        self.watch_zones(vehicle);
         self.watch_cancel(vehicle);
         self.watch_order(vehicle);
         self.begin_next(vehicle);
+        self.watch_requests(vehicle);
         self.send_instants(vehicle);
         let now = self.now.moment;
         if vehicle.wake.is_some_and(|wake| wake <= now) {
@@ -160,6 +172,8 @@ impl MasterControl {
             connection: Connection::default(),
             session: 0,
             ids: 0,
+            claims: Claims::default(),
+            zone_sets: Vec::new(),
             pending: Vec::new(),
         };
         for hook in hooks {
@@ -208,6 +222,19 @@ impl MasterControl {
             }
         }
         self.site.attempt_connection();
+        self.look_round(now);
+        if std::mem::take(&mut self.site.claims.changed) {
+            for vehicle in &mut self.fleet {
+                vehicle.at(now);
+            }
+            self.look_round(now);
+        }
+    }
+}
+
+impl MasterControl {
+    /// Looks after each vehicle that wants it now.
+    fn look_round(&mut self, now: Moment) {
         for vehicle in &mut self.fleet {
             if vehicle.wake.is_some_and(|wake| wake <= now) {
                 vehicle.wake = None;

@@ -51,7 +51,9 @@ impl Site {
             }
             let message = self.message(vehicle, running, window, window.end < asked);
             // The header comes on top.
-            if self.text("order", &message).len() + 300 <= longest {
+            let mut own = message.clone();
+            vehicle.config.spell("order", &mut own);
+            if self.text("order", &own).len() + 300 <= longest {
                 return Some((message, window));
             }
             if window.end <= window.first + 1 {
@@ -142,6 +144,7 @@ impl Site {
         let number = |value: Option<f64>| value.map(|value| json!(value));
         let widths = leg.corridor.filter(|(left, right)| *left > 0.0 || *right > 0.0);
         let curve = straight(from, to);
+        let guided = widths.is_some() || self.is_guided(vehicle, from, to);
         let fields = [
             ("edgeDescription", None, json!(leg.id)),
             ("maxSpeed", number(leg.max_speed), json!(1.0)),
@@ -157,7 +160,7 @@ impl Site {
             ("rotationAllowed", None, json!(true)),
             ("maxRotationSpeed", None, json!(1.0)),
             ("length", None, json!(distance((from.x, from.y), (to.x, to.y)))),
-            ("trajectory", widths.map(|_| curve.clone()), curve),
+            ("trajectory", guided.then(|| curve.clone()), curve),
             ("corridor", widths.map(corridor), corridor((0.5, 0.5))),
         ];
         for (name, layout, default) in fields {
@@ -171,6 +174,13 @@ impl Site {
             && let Some(fields) = edge.as_object_mut()
         {
             fields.shift_remove("corridor");
+        }
+        for (name, wanted) in [("releaseRequired", json!(true)), ("releaseLossBehavior", json!("STOP"))] {
+            let full = format!("order.edges.corridor.{name}");
+            let value = self.field(vehicle, &full, None, wanted, (index, window));
+            if let (Some(value), Some(corridor)) = (value, edge.get_mut("corridor").and_then(Value::as_object_mut)) {
+                corridor.insert(name.to_owned(), value);
+            }
         }
         edge["actions"] = json!(leg.actions);
         edge

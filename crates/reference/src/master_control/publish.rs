@@ -41,7 +41,9 @@ impl Site {
         if !self.sends(vehicle, &mut outgoing) {
             return;
         }
-        let payload = self.text(name, &Value::Object(outgoing.message));
+        let mut message = Value::Object(outgoing.message);
+        vehicle.config.spell(name, &mut message);
+        let payload = self.text(name, &message);
         self.push(outgoing.topic, payload, outgoing.qos, outgoing.retain);
     }
 
@@ -62,7 +64,7 @@ impl Site {
         *next = next.wrapping_add(1);
         Map::from_iter([
             ("headerId".to_owned(), json!(id)),
-            ("timestamp".to_owned(), json!(self.timestamp())),
+            ("timestamp".to_owned(), json!(self.timestamp(vehicle))),
             ("version".to_owned(), json!(vehicle.config.version)),
             ("manufacturer".to_owned(), json!(vehicle.config.manufacturer)),
             ("serialNumber".to_owned(), json!(vehicle.config.serial_number)),
@@ -70,8 +72,8 @@ impl Site {
     }
 
     /// The time as the header gives it (HDR-03).
-    pub(crate) fn timestamp(&self) -> String {
-        format!("{:.2}", self.now.utc)
+    pub(crate) fn timestamp(&self, vehicle: &Vehicle) -> String {
+        format!("{:.*}", vehicle.config.timestamp_digits, self.now.utc)
     }
 
     /// When something sent now is taken for lost.

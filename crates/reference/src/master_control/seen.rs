@@ -11,6 +11,8 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
+use super::requests::Wish;
+
 /// A longer message is not looked at.
 pub(crate) const MAX_MESSAGE: usize = 4 << 20;
 
@@ -106,6 +108,12 @@ pub(crate) struct ErrorSeen {
 }
 
 impl ErrorSeen {
+    /// Whether it is that of this name, however it is written.
+    pub(crate) fn is(&self, name: &str) -> bool {
+        let plain = |text: &str| text.replace('_', "").to_ascii_lowercase();
+        plain(&self.error_type) == plain(name)
+    }
+
     /// The value of a reference.
     pub(crate) fn reference(&self, key: &str) -> Option<&str> {
         let references = self.error_references.as_deref().unwrap_or_default();
@@ -120,6 +128,52 @@ pub(crate) struct MapSeen {
     pub(crate) map_id: String,
     pub(crate) map_version: String,
     pub(crate) map_status: String,
+}
+
+/// A set of zones on board.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct ZoneSetSeen {
+    pub(crate) zone_set_id: String,
+    pub(crate) zone_set_status: String,
+}
+
+/// Something a vehicle asks for.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct RequestSeen {
+    pub(crate) request_id: String,
+    #[serde(default)]
+    pub(crate) request_type: String,
+    pub(crate) request_status: String,
+    #[serde(default)]
+    pub(crate) zone_id: String,
+    #[serde(default)]
+    pub(crate) zone_set_id: String,
+    #[serde(default)]
+    pub(crate) edge_id: String,
+    #[serde(default)]
+    pub(crate) sequence_id: Value,
+    #[serde(default)]
+    pub(crate) trajectory: Value,
+}
+
+impl RequestSeen {
+    /// What is asked for.
+    pub(crate) fn wish(&self) -> Wish {
+        if self.edge_id.is_empty() {
+            return Wish::Zone {
+                set_id: self.zone_set_id.clone(),
+                zone_id: self.zone_id.clone(),
+                kind: self.request_type.clone(),
+                way: self.trajectory.is_object(),
+            };
+        }
+        Wish::Corridor {
+            edge_id: self.edge_id.clone(),
+            sequence: self.sequence_id.as_u64().unwrap_or(u64::MAX),
+        }
+    }
 }
 
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -161,6 +215,10 @@ pub(crate) struct State {
     pub(crate) new_base_request: Option<bool>,
     pub(crate) action_states: Vec<ActionState>,
     #[serde(default)]
+    pub(crate) instant_action_states: Vec<ActionState>,
+    #[serde(default)]
+    pub(crate) zone_action_states: Vec<ActionState>,
+    #[serde(default)]
     pub(crate) battery_state: Battery,
     pub(crate) operating_mode: String,
     pub(crate) errors: Vec<ErrorSeen>,
@@ -171,12 +229,37 @@ pub(crate) struct State {
     pub(crate) safety_state: Safety,
     #[serde(default)]
     pub(crate) maps: Option<Vec<MapSeen>>,
+    #[serde(default)]
+    pub(crate) zone_sets: Option<Vec<ZoneSetSeen>>,
+    #[serde(default)]
+    zone_requests: Option<Vec<RequestSeen>>,
+    #[serde(default)]
+    edge_requests: Option<Vec<RequestSeen>>,
 }
 
 impl State {
     /// Reported state of an action.
     pub(crate) fn action(&self, id: &str) -> Option<&ActionState> {
-        self.action_states.iter().find(|action| action.action_id == id)
+        let mut all = self.action_states.iter().chain(&self.instant_action_states);
+        all.find(|action| action.action_id == id)
+    }
+
+    /// Everything the vehicle asks for.
+    pub(crate) fn requests(&self) -> impl Iterator<Item = &RequestSeen> {
+        let zones = self.zone_requests.iter().flatten();
+        zones.chain(self.edge_requests.iter().flatten())
+    }
+
+    /// Whether the vehicle reports an error of this name, however it is written.
+    pub(crate) fn has_error(&self, name: &str) -> bool {
+        self.errors.iter().any(|error| error.is(name))
+    }
+
+    /// An action of the order that may be tried again.
+    pub(crate) fn retriable(&self) -> Option<&ActionState> {
+        self.action_states
+            .iter()
+            .find(|action| action.action_status == "RETRIABLE")
     }
 
     /// Whether master control may command the vehicle (MODE-04).
@@ -203,6 +286,12 @@ impl State {
     pub(crate) fn before_next_node(&self) -> u32 {
         let ahead = self.node_states.iter().filter_map(|node| node.sequence_id).min();
         ahead.map_or(u32::MAX, |next| next.saturating_sub(2))
+    }
+
+    /// Whether the battery is so low that the vehicle has to charge (FACT-17).
+    pub(crate) fn is_critical(&self, level: Option<f64>) -> bool {
+        let charge = self.battery_state.battery_charge;
+        charge.zip(level).is_some_and(|(charge, level)| charge <= level)
     }
 
     /// Whether something keeps the vehicle from being given new work.
@@ -280,11 +369,17 @@ pub(crate) struct Factsheet {
     pub(crate) load_types: Vec<String>,
     /// Whether the limit of nodes is 0, which is none.
     pub(crate) has_zeros: bool,
+    /// Charge in percent at and below which it has to charge.
+    pub(crate) critical_charge: Option<f64>,
+    /// Types of zones that it keeps to.
+    pub(crate) zones: Vec<String>,
 }
 
 impl Factsheet {
     /// Reads a factsheet; what is missing or strange limits nothing.
-    pub(crate) fn read(message: &Value) -> Self {
+    ///
+    /// `usual` tells the usual path of an optional parameter by that of the version of the vehicle.
+    pub(crate) fn read(message: &Value, usual: impl Fn(&str) -> Option<String>) -> Self {
         let at = |pointer: &str| message.pointer(pointer);
         let size = |value: &Value| {
             value
@@ -303,7 +398,7 @@ impl Factsheet {
         let optional = list("/protocolFeatures/optionalParameters");
         let optional = optional.iter().take(500).filter_map(|entry| {
             let text = |key: &str| entry.get(key).and_then(Value::as_str);
-            Some((text("parameter")?.to_owned(), text("support")?.to_owned()))
+            Some((usual(text("parameter")?)?, text("support")?.to_owned()))
         });
         let arrays = at("/protocolLimits/maxArrayLens").and_then(Value::as_object);
         let arrays = arrays
@@ -325,6 +420,8 @@ impl Factsheet {
                 .map_or(0.0, |seconds| seconds.clamp(0.0, 3600.0)),
             devices: texts(list("/loadSpecification/loadPositions")),
             load_types: load_types.map(str::to_owned).collect(),
+            critical_charge: at("/vehicleConfig/batteryCharging/criticalLowChargingLevel").and_then(Value::as_f64),
+            zones: texts(list("/typeSpecification/supportedZones")),
             has_zeros: at("/protocolLimits/maxArrayLens").is_some_and(|limits| limits["order.nodes"] == 0),
         }
     }

@@ -9,6 +9,7 @@ use tck_base::clock::Moment;
 
 use super::config::{SiteEdge, SiteMap, SiteNode, VehicleConfig};
 use super::seen::{Factsheet, State};
+use super::zones::WantedSet;
 
 /// More transports than this do not wait for one vehicle.
 pub(super) const MAX_QUEUE: usize = 200;
@@ -22,6 +23,8 @@ pub(crate) enum Presence {
     Unknown,
     Online,
     Away,
+    /// It is connected, sleeps, and heeds nothing but stopHibernation.
+    Asleep,
 }
 
 /// A transport somebody asked for.
@@ -227,6 +230,10 @@ pub(crate) struct Vehicle {
     pub(crate) enabling: BTreeMap<String, String>,
     /// Maps that were rolled out because an order needs them.
     pub(crate) fetched: BTreeSet<String>,
+    /// Sets of zones it shall have, one for each map.
+    pub(crate) zone_sets: Vec<WantedSet>,
+    /// Ids of sets it had, which are to be deleted.
+    pub(crate) old_zone_sets: Vec<String>,
     /// Edges it may not use, by start and end.
     pub(crate) blocked: BTreeSet<(String, String)>,
     pub(crate) header_ids: BTreeMap<&'static str, u32>,

@@ -215,9 +215,14 @@ impl Site {
             .last_mut()
             .filter(|stop| on_node && stop.actions.len() < of_node);
         let leg = way.legs.last_mut().filter(|leg| on_edge && leg.actions.len() < of_edge);
+        let on_a_node = stop.is_some();
         let place = stop.map(|stop| &mut stop.actions).or(leg.map(|leg| &mut leg.actions));
         if let Some(actions) = place {
-            actions.push(self.action(vehicle, kind, given));
+            let mut action = self.action(vehicle, kind, given);
+            if on_a_node && matches!(kind, "pick" | "drop") && may_retry(vehicle) {
+                action["retriable"] = json!(true);
+            }
+            actions.push(action);
         }
     }
 
@@ -252,6 +257,15 @@ impl Site {
             && on_edges.map(Vec::len).max() <= Some(self.most(vehicle, Measure::Actions, "edge.actions"))
             && parameters.max() <= Some(self.most(vehicle, Measure::Parameters, "actions.actionsParameters"))
     }
+}
+
+/// Whether the vehicle tries an action on a node again when it is told to (ORD-MSG-35).
+fn may_retry(vehicle: &Vehicle) -> bool {
+    let support = vehicle
+        .factsheet
+        .as_ref()
+        .and_then(|sheet| sheet.support("order.nodes.actions.retriable"));
+    vehicle.config.has("retry") && support.is_some()
 }
 
 /// How far a point is from the line between two others.

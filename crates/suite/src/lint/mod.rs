@@ -248,8 +248,7 @@ impl<'a> Linter<'a> {
         let vocabulary = self.vocabulary;
         match need {
             Need::Action { name, .. } | Need::NoAction(name) => {
-                let path = format!("action.{name}");
-                if self.packs.iter().all(|pack| vocabulary.word(*pack, &path).is_none()) {
+                if !self.packs.iter().any(|pack| vocabulary.has_action(*pack, name)) {
                     let names: BTreeSet<String> = self
                         .packs
                         .iter()
@@ -291,7 +290,19 @@ impl<'a> Linter<'a> {
                         .unknown("unknown-statement", at, "statement of a profile", name, known());
                 }
             }
-            Need::Tap | Need::MapServer => {}
+            Need::Zone(Some(name)) | Need::NoZone(name) => {
+                let words = self.packs.iter().filter_map(|pack| vocabulary.word(*pack, "zoneType"));
+                let words = words.filter_map(|words| Some(words.as_object()?.values().cloned().collect::<Vec<_>>()));
+                let names: BTreeSet<String> = words
+                    .flatten()
+                    .filter_map(|name| name.as_str().map(str::to_owned))
+                    .collect();
+                if !names.contains(name) {
+                    let known = names.iter().map(String::as_str);
+                    self.problems.unknown("unknown-zone", at, "type of zones", name, known);
+                }
+            }
+            Need::Zone(None) | Need::Tap | Need::MapServer => {}
         }
     }
 

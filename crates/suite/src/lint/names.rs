@@ -45,6 +45,7 @@ pub(super) const TIMES: [(&str, &str); 14] = [
 fn members(sample: &SampleKind) -> impl Iterator<Item = (&'static str, &'static str)> {
     let own = match sample.place {
         Place::Anywhere => None,
+        Place::Zone => Some(("list", "its parameters as a list, as a zone has them")),
         Place::Shown => Some(("shows", "the information that shows it")),
         Place::Node => Some(("node", "the node where it is performed")),
         Place::Edge => Some(("edge", "the edge where it is performed")),
@@ -98,6 +99,10 @@ pub fn variables() -> Vec<Variable> {
             "The edgeId of an edge of the course, such as `course.a-b`; members as of a node.",
         ),
         variable("run.NAME", "A fresh id, the same wherever the test writes the name."),
+        variable(
+            "now.in-2s",
+            "In a message that is sent: the time so many seconds, or milliseconds (`now.in-500ms`), after it is made.",
+        ),
         variable("serve.NAME.url", "Address of the file that `serve: NAME` offers."),
         variable("serve.NAME.sha256", "Hash of that file."),
         variable("vehicle.manufacturer", "Manufacturer of the first mock vehicle (master control under test)."),

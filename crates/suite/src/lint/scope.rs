@@ -6,7 +6,7 @@ use super::names::{TIMES, of_profile};
 use super::vocabulary::Vocabulary;
 use crate::fields::Problems;
 use crate::grammar::is_course_name;
-use crate::model::{Step, Verb};
+use crate::model::{Step, Verb, later};
 use tck_base::diagnostic::{Diagnostic, Span, did_you_mean};
 use tck_base::pattern::{Term, TermKind};
 use tck_course::is_station;
@@ -164,6 +164,10 @@ impl<'a> Scope<'a> {
                 "`${each.serialNumber}`, `${each.manufacturer}` and `${each.next}` go with `each: vehicle`".to_owned(),
             ),
             "run" => only_in_tests(!rest.is_empty(), "write such as `${run.order}`".to_owned()),
+            "now" if later(name).is_some() => only_in_tests(true, String::new()),
+            "now" if !self.names.contains_key(root) => {
+                unknown("`${now.in-2s}` is two seconds after the message is made".to_owned())
+            }
             "serve" => self.served(name, rest, span),
             // Filled in, or noted, before the steps were read.
             "case" | "with" if self.in_test => None,

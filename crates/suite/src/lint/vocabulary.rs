@@ -6,8 +6,8 @@ use std::rc::Rc;
 
 use serde_json::Value;
 
-use tck_pack::{Breakage, BreakageScope, Catalogue, Hooks, Packs, Role, Shape, Version};
-use tck_view::{Field, Topic};
+use tck_pack::{Breakage, BreakageScope, Catalogue, Hooks, Pack, Packs, Role, Shape, Version};
+use tck_view::{Field, Object, Topic};
 
 /// What the catalogue says about one requirement.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -36,6 +36,10 @@ pub trait Vocabulary {
     fn lost(&self, pack: usize, topic: &str, path: &[&str]) -> bool;
     /// A word of the vocabulary: `error.outdatedUpdate`.
     fn word(&self, pack: usize, path: &str) -> Option<Value>;
+    /// Whether a pack has a predefined action, told by its usual name or as the version writes it.
+    fn has_action(&self, pack: usize, name: &str) -> bool {
+        self.word(pack, &format!("action.{name}")).is_some()
+    }
     /// A requirement.
     fn requirement(&self, id: &str) -> Option<RequirementFacts>;
     /// Every requirement id.
@@ -134,6 +138,17 @@ impl Vocabulary for PackVocabulary<'_> {
             .filter(|part| !part.is_empty())
             .try_fold(self.packs.all().get(pack)?.vocabulary(), |value, part| value.get(part))
             .cloned()
+    }
+
+    fn has_action(&self, pack: usize, name: &str) -> bool {
+        let spelled = |pack: &Pack| {
+            let kind = pack.names().spelling(Object::OfferedAction, "actionType");
+            kind.map_or(name, |kind| kind.word(name)).to_owned()
+        };
+        let own = self.packs.all().get(pack).map(|pack| spelled(pack));
+        let written = [Some(name.to_owned()), own];
+        let mut written = written.into_iter().flatten();
+        written.any(|name| self.word(pack, &format!("action.{name}")).is_some())
     }
 
     fn requirement(&self, id: &str) -> Option<RequirementFacts> {

@@ -1,6 +1,7 @@
 //! What a test is, once it has been read and linted.
 
 mod conversation;
+mod later;
 mod monitor;
 mod path;
 mod purpose;
@@ -147,7 +148,7 @@ pub enum Need {
     Action {
         /// actionType.
         name: String,
-        /// `INSTANT`, `NODE` or `EDGE`.
+        /// `INSTANT`, `NODE`, `EDGE` or `ZONE`.
         scope: Option<String>,
     },
     /// `no action NAME`: the factsheet does not list it.
@@ -167,11 +168,16 @@ pub enum Need {
     /// `profile NAME`: the profile says so in `[device]`, such as `stops-between-nodes`,
     /// `node-bound`, `interruptible-actions`.
     Profile(String),
+    /// `zone TYPE`: the factsheet says that the vehicle heeds zones of this type; `zones`: of any type.
+    Zone(Option<String>),
+    /// `no zone TYPE`: the vehicle does not heed zones of this type.
+    NoZone(String),
     /// `limit NAME`: the factsheet states this protocol limit, such as `maxArrayLens.order.nodes`.
     Limit(String),
 }
 
 pub use conversation::{BrokenMember, ConversationPart, place_in_body};
+pub use later::later;
 pub use monitor::{About, Monitor, Recordings, Rule};
 pub use path::Path;
 pub use purpose::Purpose;
@@ -579,6 +585,8 @@ pub struct Serve {
     pub name: String,
     /// File of `fixtures/maps/` or of the profile; a built-in map unless said.
     pub file: Option<Term>,
+    /// A JSON document that is served instead of a file.
+    pub json: Option<Term>,
     /// How it is served.
     pub behaviour: ServeBehaviour,
 }

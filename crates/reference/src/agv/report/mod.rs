@@ -55,7 +55,14 @@ impl Report {
 }
 
 /// Members that change without being an event.
-const SILENT: [&str; 4] = ["agvPosition", "velocity", "batteryState", "distanceSinceLastNode"];
+const SILENT: [&str; 6] = [
+    "agvPosition",
+    "velocity",
+    "batteryState",
+    "distanceSinceLastNode",
+    "plannedPath",
+    "intermediatePath",
+];
 
 /// Differences between two states.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -76,6 +83,8 @@ pub(crate) struct Changes {
     pub(crate) actions: bool,
     /// maps (STATE-10).
     pub(crate) maps: bool,
+    /// zoneSets (STATE-23).
+    pub(crate) zone_sets: bool,
     /// Anything else.
     pub(crate) other: bool,
 }
@@ -102,8 +111,9 @@ impl Changes {
                 "lastNodeId" | "lastNodeSequenceId" => changes.node = true,
                 "operatingMode" => changes.mode = true,
                 "driving" => changes.driving = true,
-                "actionStates" | "instantActionStates" => changes.actions = true,
+                "actionStates" | "instantActionStates" | "zoneActionStates" => changes.actions = true,
                 "maps" => changes.maps = true,
+                "zoneSets" => changes.zone_sets = true,
                 _ => changes.other = true,
             }
         }
@@ -154,7 +164,7 @@ impl Agv {
 
     /// When the next message goes out by the clock.
     pub(crate) fn next_report(&self) -> Option<Moment> {
-        if !self.connection.online {
+        if !self.connection.online || self.is_mute() {
             return None;
         }
         if self.report.silent_until.is_some() {
@@ -174,7 +184,7 @@ impl Agv {
 
     /// Publishes what is due.
     pub(crate) fn flush(&mut self) {
-        if !self.connection.online {
+        if !self.connection.online || self.is_mute() {
             self.report.order_received = false;
             self.report.requested = false;
             return;
@@ -264,6 +274,7 @@ impl Agv {
                 json!(self.connection.last_header_id("state")),
             );
         }
+        self.share_paths(&mut body);
         self.says(Part::Visualization, &mut body);
         self.publish("visualization", body);
     }

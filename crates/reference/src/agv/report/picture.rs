@@ -5,7 +5,7 @@
 use serde_json::{Map, Value, json};
 
 use crate::agv::action_kinds::MAX_HEIGHT;
-use crate::agv::actions::Action;
+use crate::agv::actions::{Action, Origin};
 use crate::agv::hook_points::Part;
 use crate::agv::{Agv, Load, Mode};
 
@@ -41,7 +41,19 @@ impl Agv {
         let apart = self.config.has("instantActionStates");
         set("actionStates", self.listed(|action| !apart || action.of_order()));
         if apart {
-            set("instantActionStates", self.listed(|action| !action.of_order()));
+            set(
+                "instantActionStates",
+                self.listed(|action| action.origin == Origin::Instant),
+            );
+        }
+        if self.config.heeds("ACTION") {
+            set("zoneActionStates", self.listed(Action::of_zone));
+        }
+        if self.config.heeds_zones() {
+            set("zoneSets", self.zone_sets.picture());
+        }
+        if self.config.uses("releaseRequired") {
+            set("edgeRequests", self.edge_requests());
         }
         set("batteryState", self.battery());
         set("operatingMode", json!(self.mode_literal()));
@@ -49,6 +61,7 @@ impl Agv {
         let flashing = json!([{ "infoType": "warningLights", "infoLevel": "INFO" }]);
         set("information", if self.is_flashing() { flashing } else { json!([]) });
         set("safetyState", self.safety());
+        self.share_paths(&mut state);
         self.says(Part::State, &mut state);
         state
     }
@@ -100,7 +113,7 @@ impl Agv {
         let pose = self.motion.pose(self.moment());
         let mut position = Map::new();
         let mut set = |key: &str, value: Value| position.insert(key.to_owned(), value);
-        set("positionInitialized", json!(true));
+        set("positionInitialized", json!(!self.lost));
         set("localizationScore", json!(0.98));
         set("x", json!(pose.x));
         set("y", json!(pose.y));

@@ -35,12 +35,14 @@ impl Agv {
             self.motion.end(),
             self.actions.next_end(),
             self.errors.next_end(),
+            self.requests.next_end(self.moment()),
             self.lingers_until,
         ];
         self.connection.online
             && !self.motion.is_moving()
             && ends.iter().all(Option::is_none)
             && self.inbox.is_empty()
+            && !self.sleep.asleep
             && self.report.is_complete()
             && self.is_left_alone()
     }

@@ -14,8 +14,10 @@ mod orders;
 mod people;
 mod personas;
 mod rejections;
+mod requests;
 mod rest;
 mod scenarios;
+mod zones;
 
 use std::time::Duration;
 
@@ -46,6 +48,7 @@ fn config() -> AgvConfig {
         "visualization",
         "connection",
         "factsheet",
+        "zoneSet",
     ];
     AgvConfig {
         version: VERSION.into(),

@@ -88,7 +88,7 @@ fn say(state: &mut Object, status: &str, instead: &str) -> bool {
 fn is_behind(action: &Action, sequence_id: u32) -> bool {
     match action.origin {
         Origin::Node(own) | Origin::Edge(own) => own > sequence_id,
-        Origin::Instant => false,
+        Origin::Instant | Origin::Zone(_) => false,
     }
 }
 

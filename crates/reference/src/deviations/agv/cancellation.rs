@@ -5,7 +5,7 @@ use crate::agv::order_state::OrderState;
 use super::prelude::*;
 
 records! {
-    fault "cancels-whatever-order" ["ORD-CANCEL-25"] "Cancels the order that it has, whatever order cancelOrder names."
+    fault "cancels-whatever-order" ["ORD-CANCEL-25", "ORD-CANCEL-18"] "Cancels the order that it has, whatever order cancelOrder names."
         => forbidding(|_, what| matches!(what, Permission::LeaveOrder));
     fault "named-order-not-cancelled" ["ORD-CANCEL-24"] "Takes a cancelOrder that names an order for one without an order."
         => letting(|_, what| matches!(what, Permission::LeaveOrder));
@@ -297,7 +297,7 @@ fn has_order(agv: &Agv) -> bool {
 fn is_planned(agv: &Agv, action: &Action) -> bool {
     match action.origin {
         Origin::Node(id) | Origin::Edge(id) => id > agv.order.base_end.1,
-        Origin::Instant => false,
+        Origin::Instant | Origin::Zone(_) => false,
     }
 }
 

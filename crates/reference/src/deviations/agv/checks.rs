@@ -5,7 +5,7 @@ use super::prelude::*;
 records! {
     fault "new-order-with-update-id-taken" ["ORD-FLOW-13"] "Takes over a new order that begins with another orderUpdateId than 0."
         => overlooking(|_, what| matches!(what, Objection::UpdateId));
-    fault "other-content-overlooked" ["ORD-REJ-20"] "Takes an order for a copy whenever its ids are those of the one that it has, whatever it says."
+    fault "other-content-overlooked" ["ORD-REJ-20", "ORD-REJ-17"] "Takes an order for a copy whenever its ids are those of the one that it has, whatever it says."
         => overlooking(|_, what| matches!(what, Objection::OtherContent));
     fault "graph-unchecked" ["ORD-11"] "Takes over orders whose releases and counts make no sense."
         => overlooking(|_, what| match what {

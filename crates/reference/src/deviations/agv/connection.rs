@@ -31,8 +31,11 @@ records! {
         => joining(|_, options| if let Some(will) = &mut options.will { will.retain = false });
     fault "will-offline" ["CONN-02"] "Says OFFLINE in its last will."
         => will(|m| m.set("connectionState", "OFFLINE"));
-    fault "connection-state-underscore" ["CONN-02", "CONN-10", "JSON-02"] "Spells CONNECTIONBROKEN with an underscore."
-        => will(|m| m.set("connectionState", "CONNECTION_BROKEN"));
+    fault "connection-state-underscore" ["CONN-02", "CONN-10", "JSON-02"] "Spells CONNECTIONBROKEN with an underscore, and without one where it has one."
+        => will(|m| {
+            let has_one = m.says("connectionState", "CONNECTION_BROKEN");
+            m.set("connectionState", if has_one { "CONNECTIONBROKEN" } else { "CONNECTION_BROKEN" });
+        });
     fault "will-without-header" ["CONN-02", "HDR-01"] "Leaves the header out of its last will."
         => will(|m| m.retain(|key, _| key == "connectionState"));
     fault "will-header-id-missing" ["CONN-02", "HDR-01"] "It registers a last will without headerId."
@@ -104,7 +107,7 @@ records! {
             let gone = agv.order.drop_horizon();
             agv.actions.retain(|action| match action.origin {
                 Origin::Node(id) | Origin::Edge(id) => !gone.contains(&id),
-                Origin::Instant => true,
+                Origin::Instant | Origin::Zone(_) => true,
             });
         });
     fault "load-forgotten-with-link" ["STATE-MSG-06"] "After the link broke the vehicle reports no loads although it still carries one."

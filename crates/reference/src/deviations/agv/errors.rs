@@ -14,7 +14,7 @@ records! {
         => state(|agv, m| if agv.errors.active.iter().any(|error| error.fatal) { m.keep("errors", |error| error.says("errorLevel", "FATAL")) });
     fault "error-level-unknown" ["ERR-02", "ORD-CANCEL-19"] "Reports warnings with the level ERROR."
         => error(|_, error, m| if !error.fatal { m.set("errorLevel", "ERROR") });
-    fault "map-error-level-critical" ["ERR-02"] "It reports failed map actions with the errorLevel CRITICAL."
+    fault "map-error-level-critical" ["ERR-02", "MAP-23"] "It reports failed map actions with the errorLevel CRITICAL."
         => error(|_, error, m| if !error.fatal && refers(error, "mapVersion") { m.set("errorLevel", "CRITICAL") });
     fault "failed-action-error-level-error" ["ERR-02"] "It reports the error of a failed action with errorLevel ERROR."
         => error(|_, error, m| {

@@ -88,7 +88,7 @@ records! {
         => batch(|agv, actions| if !actions.is_empty() { agv.errors.forget_refusals() });
     fault "acknowledges-on-instant-actions" ["TOPIC-15"] "The vehicle answers every instantActions message with an empty message of its own on the same topic."
         => batch(|agv, actions| if !actions.is_empty() { acknowledge(agv) });
-    fault "instant-actions-among-those-of-orders" ["IACT-STATE-03"] "It lists instant actions among the actions of its order, and leaves their own list empty."
+    fault "instant-actions-among-those-of-orders" ["IACT-STATE-03", "STATE-MSG-09"] "It lists instant actions among the actions of its order, and leaves their own list empty."
         => state(|_, m| if let Some(Value::Array(instant)) = m.get_mut("instantActionStates") {
             let instant = std::mem::take(instant);
             if let Some(Value::Array(all)) = m.get_mut("actionStates") {

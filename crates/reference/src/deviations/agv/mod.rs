@@ -24,15 +24,19 @@ mod factsheet;
 mod format_variants;
 mod header;
 mod instants;
+mod life;
 mod maps;
 mod modes;
 mod motion;
 mod orders;
+mod paths;
 mod pause;
 mod poses;
+mod predefined;
 mod prelude;
 mod reading;
 mod refusals;
+mod requests;
 mod route;
 mod running;
 mod sending;
@@ -43,6 +47,8 @@ mod telling;
 mod tests;
 mod updates;
 mod visualization;
+mod zone_sets;
+mod zones;
 
 use std::sync::LazyLock;
 
@@ -65,8 +71,11 @@ const RECORDS: Records<dyn Deviation> = Records(&[
     errors::RECORDS,
     reading::RECORDS,
     refusals::RECORDS,
+    predefined::RECORDS,
     stations::RECORDS,
     maps::RECORDS,
+    zone_sets::RECORDS,
+    zones::RECORDS,
     visualization::RECORDS,
     factsheet::RECORDS,
     orders::RECORDS,
@@ -74,9 +83,12 @@ const RECORDS: Records<dyn Deviation> = Records(&[
     updates::RECORDS,
     cancellation::RECORDS,
     driving::RECORDS,
+    requests::RECORDS,
     running::RECORDS,
     pause::RECORDS,
     instants::RECORDS,
+    life::RECORDS,
+    paths::RECORDS,
     poses::RECORDS,
     modes::RECORDS,
     telling::RECORDS,

@@ -37,11 +37,11 @@ records! {
         });
     fault "manual-drives-orders" ["MODE-02"] "Takes orders over in MANUAL, and drives them there."
         => letting(|_, what| matches!(what, Permission::Overlook(Objection::Mode) | Permission::DriveAgainst(Hindrance::Mode)));
-    fault "manual-drives-on" ["MODE-05", "MODE-02"] "Keeps driving its order after it was switched to MANUAL, SERVICE or TEACHIN."
+    fault "manual-drives-on" ["MODE-05", "MODE-02", "ORD-CLEAR-01"] "Keeps driving its order after it was switched to MANUAL, SERVICE or TEACHIN."
         => letting(|_, what| matches!(what, Permission::KeepOrder(_) | Permission::DriveAgainst(Hindrance::Mode)));
-    fault "manual-keeps-order" ["MODE-05"] "Keeps its order in MANUAL and goes on with it afterwards."
+    fault "manual-keeps-order" ["MODE-05", "ORD-CLEAR-01"] "Keeps its order in MANUAL and goes on with it afterwards."
         => letting(|_, what| matches!(what, Permission::KeepOrder(_)));
-    fault "manual-drives-unseen" ["MODE-05"] "Clears its states in MANUAL and drives its base to the end."
+    fault "manual-drives-unseen" ["MODE-05", "ORD-CLEAR-03"] "Clears its states in MANUAL and drives its base to the end."
         => letting(|agv, what| match what {
             Permission::KeepOrder(_) => agv.mode.takes_orders(),
             what => matches!(what, Permission::DriveAgainst(Hindrance::Mode)),
@@ -53,13 +53,13 @@ records! {
             }
             true
         });
-    fault "manual-keeps-actions" ["MODE-05", "MODE-02"] "Clears its way in MANUAL and goes on with its actions."
+    fault "manual-keeps-actions" ["MODE-05", "MODE-02", "ORD-CLEAR-03"] "Clears its way in MANUAL and goes on with its actions."
         => letting(|_, what| matches!(what, Permission::KeepOrder(_))).happens(|_, agv, event| if loses_order(agv, event) {
             agv.motion.halt(agv.moment());
             agv.order.drop_route();
             agv.order.cancelled = true;
         });
-    fault "order-taken-up-again" ["MODE-05"] "Remembers the order it gave up in MANUAL, and takes it up again when it is back in AUTOMATIC."
+    fault "order-taken-up-again" ["MODE-05", "ORD-CLEAR-01"] "Remembers the order it gave up in MANUAL, and takes it up again when it is back in AUTOMATIC."
         => keep::<Option<OrderState>>().happens(|order, agv, event| {
             if loses_order(agv, event) {
                 *order = Some(agv.order.clone());
@@ -72,7 +72,7 @@ records! {
         });
     fault "manual-position-stale" ["MODE-06", "STATE-MSG-05"] "Does not follow its position in MANUAL."
         => forbidding(|_, what| matches!(what, Permission::MoveByHand));
-    fault "manual-drops-action-states" ["MODE-05", "STATE-MSG-10"] "It removes the action states of its order when it is switched to MANUAL instead of reporting them FAILED."
+    fault "manual-drops-action-states" ["MODE-05", "STATE-MSG-10", "ORD-CLEAR-03"] "It removes the action states of its order when it is switched to MANUAL instead of reporting them FAILED."
         => when(Event::GivenUpForMode(Mode::Manual), |agv| agv.actions.retain(|action| !action.of_order()));
     fault "offline-in-manual" ["CONN-08", "CONN-10"] "When it leaves the automatic modes the vehicle publishes OFFLINE but stays connected and goes on sending states."
         => plain().happens(|(), agv, event| if let Event::ModeChanging(mode) = event
@@ -91,12 +91,12 @@ records! {
             Event::ModeChanging(mode) => *parked || mode != agv.mode && mode.takes_orders() && agv.mode.takes_orders() && agv.is_occupied(),
             _ => *parked,
         });
-    fault "manual-finishes-actions" ["MODE-05"] "The actions that run when it is switched to MANUAL are reported FINISHED."
+    fault "manual-finishes-actions" ["MODE-05", "ORD-CLEAR-03"] "The actions that run when it is switched to MANUAL are reported FINISHED."
         => plain().happens(|(), agv, event| if loses_order(agv, event) {
             let active = agv.actions.iter_mut().filter(|action| action.of_order() && action.status.is_active());
             active.for_each(|action| action.end(Status::Finished));
         });
-    fault "manual-keeps-horizon" ["MODE-05", "STATE-13"] "Switched to MANUAL it clears the base of its order and keeps the horizon."
+    fault "manual-keeps-horizon" ["MODE-05", "STATE-13", "ORD-CLEAR-01"] "Switched to MANUAL it clears the base of its order and keeps the horizon."
         => keep::<Option<OrderState>>().happens(|before, agv, event| {
             if loses_order(agv, event) {
                 *before = Some(agv.order.clone());
@@ -108,7 +108,7 @@ records! {
                 agv.order.edges.extend(before.edges.into_iter().filter(|edge| !edge.released));
             }
         });
-    fault "manual-leaves-actions-waiting" ["MODE-05"] "It clears nodes and edges when it enters MANUAL but leaves the actions of the order WAITING."
+    fault "manual-leaves-actions-waiting" ["MODE-05", "ORD-CLEAR-03"] "It clears nodes and edges when it enters MANUAL but leaves the actions of the order WAITING."
         => keep::<Vec<String>>()
             .happens(|waiting, agv, event| {
                 if loses_order(agv, event) {

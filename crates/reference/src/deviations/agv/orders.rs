@@ -126,7 +126,7 @@ records! {
         => forbidding(|_, what| matches!(what, Permission::Forget(action) if action.of_order() && action.status == Status::Failed));
     fault "cancel-outlives-order" ["STATE-MSG-11"] "An ended cancelOrder stays in its action states when a new order is accepted."
         => forbidding(|_, what| matches!(what, Permission::Forget(action) if is(action, Effect::CancelOrder) && !action.of_order()));
-    fault "running-instant-dropped" ["STATE-MSG-11"] "Removes running instant actions from its states when a new order is accepted."
+    fault "running-instant-dropped" ["STATE-MSG-11", "IACT-STATE-01", "IACT-STATE-02"] "Removes running instant actions from its states when a new order is accepted."
         => letting(|_, what| matches!(what, Permission::Forget(_)));
     fault "never-starts" ["ORD-FLOW-07", "ORD-06"] "Accepts an order and does not begin to drive."
         => forbidding(|_, what| matches!(what, Permission::SetOut(_)));

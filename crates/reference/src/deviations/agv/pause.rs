@@ -79,7 +79,7 @@ records! {
                 let gone = agv.order.drop_horizon();
                 agv.actions.retain(|action| match action.origin {
                     Origin::Node(id) | Origin::Edge(id) => !gone.contains(&id),
-                    Origin::Instant => true,
+                    Origin::Instant | Origin::Zone(_) => true,
                 });
             }
             None

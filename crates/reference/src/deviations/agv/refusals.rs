@@ -117,7 +117,7 @@ records! {
             let gone = agv.order.drop_horizon();
             agv.actions.retain(|action| match action.origin {
                 Origin::Node(id) | Origin::Edge(id) => !gone.contains(&id),
-                Origin::Instant => true,
+                Origin::Instant | Origin::Zone(_) => true,
             });
         });
     fault "rejected-update-id-adopted" ["ORD-FLOW-08", "ORD-FLOW-10"] "It adopts the orderUpdateId of an update that it rejects because it does not join the order."

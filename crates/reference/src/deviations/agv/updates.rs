@@ -241,7 +241,7 @@ records! {
             });
     fault "update-clears-action-states" ["STATE-MSG-10"] "Removes its finished actions from the states when an update comes."
         => updating(|agv, _| agv.actions.retain(|action| !action.of_order() || !action.status.is_terminal()));
-    fault "update-forgets-instant-actions" ["STATE-MSG-10", "STATE-MSG-09"] "An accepted update removes the ended instant actions from its action states."
+    fault "update-forgets-instant-actions" ["STATE-MSG-10", "STATE-MSG-09", "IACT-STATE-01"] "An accepted update removes the ended instant actions from its action states."
         => updating(|agv, _| agv.actions.retain(|action| action.of_order() || !action.status.is_terminal()));
     fault "continuation-clears-action-states" ["STATE-MSG-10", "STATE-MSG-09"] "It empties actionStates, as for a new order, when an update continues a completed order."
         => updating(|agv, _| if !agv.is_busy() { agv.actions.retain(|action| !action.status.is_terminal()) });
@@ -339,7 +339,7 @@ fn revive(agv: &mut Agv) {
 fn is_behind(action: &Action, sequence_id: u32) -> bool {
     match action.origin {
         Origin::Node(own) | Origin::Edge(own) => own > sequence_id,
-        Origin::Instant => false,
+        Origin::Instant | Origin::Zone(_) => false,
     }
 }
 
@@ -368,7 +368,7 @@ fn shorten_base(agv: &mut Agv) {
     agv.order.edges.retain(|edge| !gone(edge.sequence_id));
     agv.actions.retain(|action| match action.origin {
         Origin::Node(sequence_id) | Origin::Edge(sequence_id) => !gone(sequence_id),
-        Origin::Instant => true,
+        Origin::Instant | Origin::Zone(_) => true,
     });
     agv.order.base_end = end;
 }

@@ -14,7 +14,7 @@ records! {
             let stay = last.filter(|node| !node.is_empty()).map(|to| Transport { to, ..Transport::default() });
             site.drop_order(vehicle, then.take().or(stay));
         }).allows(|(), _, _, what, usual| usual || matches!(what, Permission::Interrupt));
-    fault "updated-while-cancelled" ["ORD-CANCEL-01"] "Extends the base of an order it is calling off."
+    fault "updated-while-cancelled" ["ORD-CANCEL-01", "ORD-CANCEL-22"] "Extends the base of an order it is calling off."
         because "That an order which is called off gets no update is read out of the text."
         => plain().allows(|(), _, vehicle, what, usual| {
             let running = vehicle.running.as_ref().filter(|running| running.confirmed);

@@ -26,6 +26,7 @@ mod dispatch;
 mod form;
 mod header;
 mod instants;
+mod later;
 mod limits;
 mod maps;
 mod options;
@@ -33,12 +34,14 @@ mod orders;
 mod prelude;
 mod presence;
 mod reading;
+mod requests;
 mod sending;
 mod starts;
 #[cfg(test)]
 mod tests;
 mod transport;
 mod updates;
+mod zones;
 
 use std::sync::LazyLock;
 
@@ -80,6 +83,9 @@ const RECORDS: Records<dyn Deviation> = Records(&[
     presence::RECORDS,
     reading::RECORDS,
     declining::RECORDS,
+    later::RECORDS,
+    zones::RECORDS,
+    requests::RECORDS,
 ]);
 
 /// Its faults and lapses.

@@ -13,6 +13,7 @@ pub(super) use crate::master_control::hooks::{
     Deviation, Event, Fate, Field, Heard, Hooks, Measure, Object, Occasion, Outgoing, Permission, Span, Worded,
 };
 pub(super) use crate::master_control::order::Window;
+pub(super) use crate::master_control::requests::{Claim, Grant, Wish};
 pub(super) use crate::master_control::seen::{Factsheet, Position, State};
 pub(super) use crate::master_control::vehicle::{Leg, Presence, Running, Stop, Transport, Vehicle};
 pub(super) use crate::master_control::ways::{Pose, Standing};
@@ -82,7 +83,11 @@ messages! {
     /// Words updates of orders otherwise.
     update: outgoing outgoing.is_update();
     /// Words messages with instant actions otherwise.
-    instant: outgoing outgoing.name != "order";
+    instant: outgoing outgoing.name == "instantActions";
+    /// Words sets of zones otherwise.
+    zone_set: outgoing outgoing.name == "zoneSet";
+    /// Words answers to requests otherwise.
+    responses: outgoing outgoing.name == "responses";
     /// Words the message with cancelOrder otherwise.
     cancel: outgoing outgoing.tells(&["cancelOrder"]);
     /// Words an order otherwise that is sent again because it was lost.
@@ -114,6 +119,10 @@ entries! {
     horizon: message, change each_element(message, |element| if element.says("released", false) { change(element) });
     /// Words each action otherwise.
     action: message, change each_action(message, change);
+    /// Words each zone of a set otherwise.
+    zone: message, change message.part("zoneSet", |set| set.each("zones", change));
+    /// Words each answer to a request otherwise.
+    response: message, change message.each("responses", change);
 }
 
 type WordingAction = fn(&str, &mut Object);

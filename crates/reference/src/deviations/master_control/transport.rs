@@ -29,7 +29,7 @@ records! {
             let Some(vehicle) = fleet.first() else { return };
             let message = json!({
                 "headerId": 0,
-                "timestamp": site.timestamp(),
+                "timestamp": site.timestamp(vehicle),
                 "version": vehicle.config.version,
                 "manufacturer": vehicle.config.manufacturer,
                 "serialNumber": vehicle.config.serial_number,
@@ -197,7 +197,7 @@ records! {
                 let due = *beat.get_or_insert(now);
                 if due <= now {
                     *beat = Some(now + Duration::from_secs(10));
-                    let text = json!({ "alive": true, "at": site.timestamp() }).to_string();
+                    let text = json!({ "alive": true, "at": site.timestamp(vehicle) }).to_string();
                     site.push(format!("{}/alive", site.config.name), text.into_bytes(), 0, false);
                 }
                 vehicle.at(beat.unwrap_or(due));

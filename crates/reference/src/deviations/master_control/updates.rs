@@ -16,7 +16,7 @@ records! {
         });
     fault "stitching-moved" ["ORD-UPD-06"] "Rounds the position of the stitching node to decimetres, and shifts it."
         => stitching(|node, _| node.part("nodePosition", |place| shift(place, "x", 0.3)));
-    fault "stitching-action-added" ["ORD-UPD-06"] "Adds an action to the stitching node."
+    fault "stitching-action-added" ["ORD-UPD-06", "ORD-UPD-15"] "Adds an action to the stitching node."
         => stitching(|node, id| node.add("actions", json!({ "actionType": "beep", "actionId": id, "blockingType": "NONE" })));
     fault "stitching-actions-renamed" ["ORD-UPD-06"] "The actions of the stitching node have other actionIds in an order update than before."
         => stitching(|node, id| node.each("actions", |action| action.set("actionId", format!("{}-{id}", action.text("actionId")))));

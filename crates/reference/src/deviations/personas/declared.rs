@@ -17,7 +17,7 @@ impl Persona {
             let mut told = agv.true_factsheet();
             lay_over(Some(&patch), &mut told);
             follow(&mut agv.config, &patch, &Value::Object(told));
-            self.factsheet = Some(patch);
+            self.factsheet = Some(spelled(agv, patch));
         }
         self.replaced = false;
         let mut body = agv.true_factsheet();
@@ -33,6 +33,24 @@ impl Persona {
         }
         self.factsheet = None;
     }
+}
+
+/// A factsheet whose optional parameters are called as the version does; what it does not have is left out.
+fn spelled(agv: &Agv, mut patch: Value) -> Value {
+    let listed = patch.pointer_mut("/protocolFeatures/optionalParameters");
+    if let Some(listed) = listed.and_then(Value::as_array_mut) {
+        listed.retain_mut(|entry| {
+            let Some(usual) = entry["parameter"].as_str().map(str::to_owned) else {
+                return true;
+            };
+            let own = agv.spelled_parameter(&usual);
+            if let Some(own) = &own {
+                entry["parameter"] = Value::from(own.as_str());
+            }
+            own.is_some() || !usual.contains('.')
+        });
+    }
+    patch
 }
 
 /// A limit; zero is none.
@@ -81,6 +99,10 @@ fn follow(config: &mut AgvConfig, patch: &Value, told: &Value) {
     if let Some(positions) = patch["loadSpecification"]["loadPositions"].as_array() {
         let names = positions.iter().filter_map(Value::as_str).take(16);
         config.load_positions = names.map(str::to_owned).collect();
+    }
+    if let Some(zones) = patch["typeSpecification"]["supportedZones"].as_array() {
+        let names = zones.iter().filter_map(Value::as_str).take(16);
+        config.zone_types = names.map(str::to_owned).collect();
     }
     let body = &patch["physicalParameters"];
     let positive = |value: &Value| value.as_f64().filter(|number| *number > 0.0);

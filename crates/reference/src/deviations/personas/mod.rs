@@ -4,6 +4,7 @@
 //! [`Persona`] holds what was told, and takes hold at the hook points of the vehicle; all of it ends together, with
 //! `well-behaved` or `reset`.
 
+mod asking;
 mod declared;
 mod orders;
 mod speech;
@@ -22,6 +23,7 @@ use crate::agv::hooks::{Deviation, Event, Head, Leg, Outgoing, Part, Permission,
 use crate::agv::{Agv, AgvConfig};
 use tck_base::clock::Moment;
 
+use asking::Asking;
 use orders::Rejection;
 pub use words::WORDS;
 
@@ -56,14 +58,14 @@ struct Persona {
     cancel_held_until: Option<Moment>,
     /// actionType, if only one fails, and the errorType.
     failing: Option<(Option<String>, String)>,
+    /// What fails is RETRIABLE where that was asked for.
+    may_retry: bool,
     /// errorType for every downloadMap.
     map_refusal: Option<String>,
     /// It asks for a longer base.
     wants_base: bool,
     /// batteryCharge.
     charge: Option<f64>,
-    /// It does not know where it is.
-    lost: bool,
     /// It stands where it is.
     halted: bool,
     /// It will stand before it reaches this node.
@@ -72,6 +74,8 @@ struct Persona {
     version: Option<String>,
     /// Its last will is old.
     stale_will: bool,
+    /// What it asks the master control for.
+    asking: Asking,
     /// What is laid over the states, the visualization and the factsheet.
     state: Option<Value>,
     visualization: Option<Value>,
@@ -122,12 +126,9 @@ impl Deviation for Persona {
     }
 
     fn says(&self, _: &Agv, part: Part<'_>, words: &mut Map<String, Value>) -> bool {
-        match part {
-            Part::State => self.says_in_state(words),
-            Part::Position if self.lost => {
-                words.insert("positionInitialized".into(), json!(false));
-            }
-            _ => {}
+        if matches!(part, Part::State) {
+            self.says_in_state(words);
+            self.asking.says(words);
         }
         true
     }
@@ -150,8 +151,7 @@ impl Deviation for Persona {
     fn allows(&self, _: &Agv, what: Permission<'_>, usual: bool) -> bool {
         match what {
             Permission::Say("state", _) => usual && !self.silent,
-            Permission::Drive => usual && !self.halted && !self.lost,
-            Permission::BeginAt(_) => usual && !self.lost,
+            Permission::Drive => usual && !self.halted,
             Permission::EndCancel => usual && self.cancel_held_until.is_none() && !self.cancel_stuck,
             _ => usual,
         }
@@ -166,6 +166,9 @@ impl Deviation for Persona {
     }
 
     fn hears(&mut self, agv: &mut Agv, name: &str, payload: &[u8]) -> bool {
+        if name == "responses" {
+            self.asking.answered(agv, payload);
+        }
         name != "order" || !(self.ignores_order() || self.rejects(agv, payload))
     }
 
@@ -178,7 +181,11 @@ impl Deviation for Persona {
     fn does(&mut self, agv: &mut Agv, action: &Action) -> Option<Outcome> {
         let error_type = self.failure_of(action)?.clone();
         let problem = Problem::unable(action, "the action did not succeed");
-        agv.end_failed(&action.request.id);
+        if self.may_retry && action.request.retriable {
+            agv.waits_for_retry(&action.request.id);
+        } else {
+            agv.end_failed(&action.request.id);
+        }
         agv.errors.raise(ActiveError {
             error_type,
             fatal: false,
@@ -190,7 +197,7 @@ impl Deviation for Persona {
     }
 
     fn due(&self, _: &Agv) -> Option<Moment> {
-        self.cancel_held_until
+        self.cancel_held_until.into_iter().chain(self.asking.due()).min()
     }
 
     fn stirs(&self, _: &Agv) -> bool {
@@ -201,8 +208,10 @@ impl Deviation for Persona {
         match event {
             Event::LegEnded => self.stand_if_told(agv),
             Event::CancelBegun => self.cancel_held_until = self.cancel_lasts.map(|lasts| agv.moment() + lasts),
-            Event::Woken => self.cancel_held_until = self.cancel_held_until.filter(|until| *until > agv.moment()),
-            Event::Placed => self.lost = false,
+            Event::Woken => {
+                self.cancel_held_until = self.cancel_held_until.filter(|until| *until > agv.moment());
+                self.asking.expire(agv);
+            }
             _ => {}
         }
     }

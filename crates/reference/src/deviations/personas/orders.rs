@@ -43,6 +43,7 @@ impl Persona {
         let Ok(message) = serde_json::from_slice::<Value>(payload) else {
             return false;
         };
+        let message = agv.understood("order", message);
         let Ok(order) = Order::read(&message) else { return false };
         if order.graph_defect().is_some() || agv.check_ids(&order).is_err() {
             return false;

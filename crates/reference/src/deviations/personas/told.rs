@@ -24,6 +24,15 @@ impl Told<'_> {
         self.0.get("count").and_then(Value::as_u64).unwrap_or(usual)
     }
 
+    pub(super) fn number(&self, key: &str) -> Option<f64> {
+        self.0.get(key)?.as_f64()
+    }
+
+    pub(super) fn whole(&self, key: &str) -> Option<u64> {
+        let told = self.0.get(key)?;
+        told.as_u64().or_else(|| told.as_str()?.parse().ok())
+    }
+
     pub(super) fn flag(&self, key: &str) -> Option<bool> {
         self.0.get(key)?.as_bool()
     }

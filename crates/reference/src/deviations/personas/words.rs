@@ -15,8 +15,6 @@ pub const WORDS: &[&str] = &[
     "well-behaved",
     "break-off",
     "stale-will",
-    "lose-position",
-    "find-position",
     "halt",
     "stop-before",
     "go-on",
@@ -32,6 +30,12 @@ pub const WORDS: &[&str] = &[
     "hold-cancel",
     "fail-actions",
     "refuse-map",
+    "fall-asleep",
+    "wake-up",
+    "ask-for-zone",
+    "ask-for-corridor",
+    "withdraw-requests",
+    "hold-requests",
     "declare",
     "show",
     "show-visualization",
@@ -61,19 +65,25 @@ impl Persona {
             "fail-actions" => {
                 let error_type = told.text("errorType").unwrap_or_else(|| "actionFailed".to_owned());
                 self.failing = Some((told.text("actionType"), error_type));
+                self.may_retry = told.flag("retriable") == Some(true);
             }
             "refuse-map" => {
                 let usual = || agv.config.errors.map.clone();
                 self.map_refusal = Some(told.text("errorType").unwrap_or_else(usual));
             }
+            "fall-asleep" => agv.falls_asleep(),
+            "wake-up" if agv.sleep.asleep => agv.wakes_up(),
+            "wake-up" => {}
+            "ask-for-zone" => self.asking.for_zone(agv, &told),
+            "ask-for-corridor" => self.asking.for_corridor(agv, &told),
+            "withdraw-requests" => self.asking.withdraw(told.text("requestId").as_deref()),
+            "hold-requests" => self.asking.hold(told.text("status").as_deref()),
             "request-new-base" => self.wants_base = told.flag("on").unwrap_or(true),
             "set-battery" => {
                 let charge = arguments.get("charge").and_then(Value::as_f64);
                 self.charge = charge.map(|charge| charge.clamp(0.0, 100.0)).or(self.charge);
                 agv.charging = told.flag("charging").unwrap_or(agv.charging);
             }
-            "lose-position" => self.lost = true,
-            "find-position" => self.lost = false,
             "halt" => self.halted = true,
             "go-on" => (self.halted, self.stop_before) = (false, None),
             "stop-before" => self.stop_before(agv, told.text("nodeId")),
@@ -112,6 +122,7 @@ impl Persona {
         if agv.loads.is_empty() {
             agv.stations.clone_from(&agv.config.stations);
         }
+        agv.find_position();
         self.declare_nothing(agv);
         if std::mem::take(self).replaced {
             republish(agv);

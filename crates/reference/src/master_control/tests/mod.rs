@@ -2,7 +2,9 @@
 
 mod driving;
 mod hostile;
+mod later;
 mod talking;
+mod zones;
 
 use std::time::Duration;
 
@@ -49,7 +51,9 @@ pub(crate) fn config() -> MasterControlConfig {
         serial_number: serial.into(),
         version: VERSION.into(),
         features: ["mapActions", "factsheetRequest"].map(String::from).into(),
+        timestamp_digits: 2,
         topics: topics(serial),
+        ..VehicleConfig::default()
     };
     MasterControlConfig {
         vehicles: vec![vehicle("agv-1"), vehicle("agv-2")],

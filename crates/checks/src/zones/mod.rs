@@ -1,0 +1,24 @@
+//! What a vehicle does in zones, and about zone sets.
+
+mod actions;
+mod blocked;
+mod directed;
+mod line_guided;
+mod sets;
+mod speed;
+#[cfg(test)]
+mod tests;
+
+pub(super) use actions::ZONE_ACTIONS;
+pub(super) use blocked::BLOCKED;
+pub(super) use directed::DIRECTED;
+pub(super) use line_guided::LINE_GUIDED;
+pub(super) use sets::ZONE_SETS;
+pub(super) use speed::SPEED;
+
+use tck_view::StateView;
+
+/// Modes in which the vehicle goes where it is ordered to.
+fn drives_by_order(state: &StateView) -> bool {
+    state.operating_mode.is("AUTOMATIC") || state.operating_mode.is("SEMIAUTOMATIC")
+}

@@ -1,0 +1,109 @@
+//! Deviations of going to sleep, waking up and leaving, and of the triggers that actions wait for (section 6.2.3.1 of 3.0).
+
+use super::prelude::*;
+use crate::agv::report::Telling;
+
+records! {
+    fault "sleeps-without-a-word" ["HIB-01"] "It goes to hibernation while its last state still says that startHibernation is RUNNING."
+        => action(|_, action, m| {
+            if is(action, Effect::StartHibernation) && action.status == Status::Finished {
+                m.set("actionStatus", "RUNNING");
+            }
+            true
+        });
+    fault "hibernating-not-said" ["HIB-02"] "It goes silent on startHibernation, and its connection topic goes on saying ONLINE."
+        => unsaid(|_, name, body| name == "connection" && body.says("connectionState", "HIBERNATING"));
+    fault "hibernating-not-retained" ["HIB-02"] "It says HIBERNATING without the retain flag, so that the broker keeps ONLINE."
+        => sending(|_, out| if out.message.says("connectionState", "HIBERNATING") { out.retain = false });
+    fault "hibernates-disconnected" ["HIB-03"] "It disconnects when it goes to hibernation, and comes back a while later."
+        => when(Event::FallenAsleep, |agv| {
+            agv.shut_down();
+            let back = agv.moment() + Duration::from_secs(1);
+            agv.connection.wanted_at(back);
+        });
+    fault "hibernates-with-its-order" ["HIB-04", "ORD-CLEAR-02", "HIB-05"] "It keeps its order in hibernation."
+        => forbidding(|_, what| matches!(what, Permission::ClearForSleep));
+    fault "sleepwalks" ["HIB-05"] "It is on another node after its hibernation."
+        => when(Event::FallenAsleep, |agv| {
+            let other = agv.config.nodes.iter().find(|node| node.id != agv.order.last_node).map(|node| node.id.clone());
+            agv.order.last_node = other.unwrap_or_default();
+        });
+    fault "obeys-in-its-sleep" ["HIB-06"] "It takes orders and instant actions in hibernation, and shows them when it wakes."
+        => letting(|_, what| matches!(what, Permission::HeedAsleep));
+    fault "takes-up-what-it-slept-through" ["HIB-06"] "It works off what it was sent in hibernation as soon as it wakes."
+        => keep::<Vec<Vec<u8>>>()
+            .hears(|missed, agv, name, payload| {
+                if agv.overhears() && name == "instantActions" {
+                    missed.push(payload.to_vec());
+                }
+                true
+            })
+            .happens(|missed, agv, event| if event == Event::Awoken {
+                for payload in std::mem::take(missed) {
+                    agv.instant_actions_received(&payload);
+                }
+            });
+    fault "chatters-in-its-sleep" ["HIB-07"] "It goes on sending states in hibernation." because "The text lets it; the table of connection states does not."
+        => letting(|_, what| matches!(what, Permission::SpeakAsleep));
+    fault "wakes-without-online" ["HIB-10"] "It goes on sending states after stopHibernation, and its connection topic still says HIBERNATING."
+        => unsaid(|agv, name, body| name == "connection" && body.says("connectionState", "ONLINE") && agv.states_sent > 0 && agv.connection.sessions == 1);
+    fault "wakes-without-finishing" ["HIB-10"] "It leaves stopHibernation RUNNING for ever when it has woken up."
+        => action(|_, action, m| {
+            if is(action, Effect::StopHibernation) && action.status == Status::Finished {
+                m.set("actionStatus", "RUNNING");
+            }
+            true
+        });
+    fault "sleeps-for-ever" ["HIB-11", "HIB-10"] "It hears nothing at all in hibernation, and is never awake again."
+        => plain().hears(|(), agv, _, _| !agv.sleep.asleep);
+    fault "sleeps-despite-the-switch" ["HIB-12"] "It goes to hibernation although a switch forbids that."
+        => forbidding(|agv, what| agv.sleep.blocked && matches!(what, Permission::HeedSwitch));
+    fault "shuts-down-mid-order" ["SHUT-01"] "It shuts down although it has an order."
+        => forbidding(|_, what| matches!(what, Permission::RefuseShutdown));
+    fault "shutdown-ends-the-order" ["SHUT-01"] "It refuses to shut down while it has an order, and gives the order up all the same."
+        => failed(Effect::Shutdown, |agv, _| agv.give_up_order());
+    fault "shutdown-is-a-word" ["SHUT-02"] "It reports shutdown FINISHED and stays where it is."
+        => instead(Effect::Shutdown, |_, _| Some(Outcome::Done(None)));
+    fault "shuts-down-without-a-word" ["SHUT-02"] "It shuts down before a state says that shutdown is FINISHED." because "By the ruling of SHUT-02 a missing last state is a warning."
+        => action(|_, action, m| {
+            if is(action, Effect::Shutdown) && action.status == Status::Finished {
+                m.set("actionStatus", "RUNNING");
+            }
+            true
+        });
+
+    fault "node-kept-when-driven-away" ["MODE-14"] "It goes on naming its last node when it was driven away from it by hand."
+        => forbidding(|_, what| matches!(what, Permission::ForgetNode));
+    fault "hard-instant-ignored" ["IACT-09"] "It passes over an instant action whose blockingType is not NONE." because "It breaks a recommendation only."
+        => plain().reads_instants(|(), _, actions| actions.retain(|action| action["blockingType"] == "NONE"));
+    fault "retries-whatever-fails" ["RETRY-02"] "It lets an action wait for a retry that was not sent as retriable."
+        => action(|_, action, m| {
+            let failed = action.of_order() && action.status == Status::Failed && !action.request.retriable;
+            if failed && is(action, Effect::Pick) {
+                m.set("actionStatus", "RETRIABLE");
+            }
+            true
+        });
+    fault "retriable-survives-cancel" ["ORD-CANCEL-27", "RETRY-06"] "An action that waits for a retry goes on waiting when its order is cancelled."
+        => breaking(|_, action, usual| usual.filter(|_| action.status != Status::Retriable));
+    fault "flags-without-state" ["STATE-18", "STATE-19"] "It sends no state of its own when paused or safetyState changes."
+        => plain().tells(|(), _, changes, _| match changes.other && !changes.actions && !changes.error {
+            true => Telling::Later,
+            false => Telling::Now,
+        });
+    fault "factsheet-without-pause" ["FACT-18"] "Its factsheet lists neither startPause nor stopPause." because "By the ruling of FACT-18 it is a warning where they work."
+        => factsheet(|_, m| m.part("protocolFeatures", |f| f.keep("agvActions", |a| !matches!(a.text("actionType"), "startPause" | "stopPause"))));
+    fault "trigger-is-a-word" ["TRIG-01"] "trigger is FINISHED, and what waits for it goes on waiting."
+        => instead(Effect::Trigger, |_, _| Some(Outcome::Done(None)));
+    fault "trigger-never-finished" ["TRIG-01"] "It leaves trigger RUNNING for ever when it has released what waited for it."
+        => action(|_, action, m| {
+            if is(action, Effect::Trigger) && action.status == Status::Finished {
+                m.set("actionStatus", "RUNNING");
+            }
+            true
+        });
+    fault "trigger-in-vain-finished" ["TRIG-02"] "trigger is FINISHED although nothing waited for it." because "It breaks a recommendation only."
+        => after(Effect::Trigger, |_, _, _| Outcome::Done(None));
+    fault "any-trigger-will-do" ["ACT-37"] "A button on the vehicle ends what waits for the fleet control alone." because "The text does not say that nothing else may end it."
+        => letting(|_, what| matches!(what, Permission::HeedTrigger(action) if action.status == Status::Running));
+}

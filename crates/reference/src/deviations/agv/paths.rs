@@ -1,0 +1,96 @@
+//! Deviations of the paths that a freely navigating vehicle shares, and of how it says that it is lost (sections 6.8 and 7.8 of 3.0).
+
+use super::prelude::*;
+
+records! {
+    fault "own-path-missing" ["PATH-01"] "It shares its next metres, and not the path that it has planned."
+        => state(|_, m| m.unset("plannedPath"));
+    fault "intermediate-path-missing" ["PATH-01"] "It shares the path that it has planned, and not its next metres."
+        => state(|_, m| m.unset("intermediatePath"));
+    fault "paths-only-at-rest" ["PATH-01"] "It shares its paths as long as it stands, and none while it drives."
+        => state(|agv, m| if agv.motion.is_moving() {
+            m.unset("plannedPath");
+            m.unset("intermediatePath");
+        });
+    fault "planned-path-begins-ahead" ["PATH-02"] "The path that it has planned begins at its next node and not where it is."
+        => state(|_, m| m.part("plannedPath", |path| path.part("trajectory", |t| {
+            if let [first, second, ..] = t.list("controlPoints") {
+                *first = second.clone();
+            }
+        })));
+    fault "next-metres-begin-ahead" ["PATH-02"] "Its next metres begin three metres before it."
+        => state(|_, m| m.part("intermediatePath", |path| {
+            if let [Value::Object(first), ..] = path.list("polyline") {
+                number(first, "x", |x| x + 3.0);
+            }
+        }));
+    fault "traverses-unknown-nodes" ["PATH-03"] "It names nodes on its path that its order does not have."
+        => state(|_, m| m.part("plannedPath", |path| path.set("traversedNodes", json!(["somewhere"]))));
+    fault "planned-path-without-its-last-knot" ["PATH-03"] "The knot vector of its planned path is one too short."
+        => state(|_, m| m.part("plannedPath", |path| path.part("trajectory", |t| t.change("knotVector", |knots| {
+            if let Value::Array(knots) = knots {
+                knots.pop();
+            }
+        }))));
+    fault "planned-path-to-the-next-node" ["PATH-04"] "The path that it has planned ends at its next node."
+        => state(|_, m| m.part("plannedPath", |path| path.part("trajectory", |t| {
+            if t.list("controlPoints").len() > 2 {
+                t.change("controlPoints", |points| if let Value::Array(points) = points { points.truncate(2) });
+                t.set("knotVector", json!([0.0, 0.0, 1.0, 1.0]));
+            }
+        })));
+    fault "eta-runs-backwards" ["PATH-07"] "The times of its next metres fall from the first to the last."
+        => state(|_, m| m.part("intermediatePath", |path| {
+            let points = path.list("polyline");
+            let etas: Vec<Value> = points.iter().rev().map(|point| point["eta"].clone()).collect();
+            for (point, eta) in points.iter_mut().zip(etas) {
+                point["eta"] = eta;
+            }
+        }));
+    fault "eta-in-seconds" ["PATH-07"] "It gives the times of its next metres in seconds from now."
+        => state(|_, m| m.part("intermediatePath", |path| for (at, point) in path.list("polyline").iter_mut().enumerate() {
+            point["eta"] = json!(format!("{at}.0"));
+        }));
+    fault "next-metres-kept" ["PATH-08"] "It shares the same next metres as long as it drives."
+        => keep::<Option<Value>>().sends(|kept, agv, out| {
+            if !agv.motion.is_moving() {
+                *kept = None;
+            } else if let Some(path) = out.message.get_mut("intermediatePath") {
+                match kept {
+                    Some(kept) => path.clone_from(kept),
+                    None => *kept = Some(path.clone()),
+                }
+            }
+            true
+        });
+    fault "line-shown-as-its-own-path" ["PATH-09"] "A vehicle on virtual lines shares its way as a path that it has planned itself." because "By the ruling of PATH-09 it is a warning."
+        => letting(|_, what| matches!(what, Permission::ReportPath));
+    fault "trajectory-of-its-own-on-an-edge" ["STATE-MSG-21"] "It shows a trajectory in its edge states that nobody has sent."
+        => edge(|agv, edge, m| {
+            if agv.config.plans && edge.trajectory.is_none() {
+                let pose = agv.motion.pose(agv.moment());
+                let point = |x: f64| json!({ "x": x, "y": pose.y, "weight": 1.0 });
+                m.set("trajectory", json!({ "degree": 1, "knotVector": [0.0, 0.0, 1.0, 1.0], "controlPoints": [point(pose.x), point(pose.x + 1.0)] }));
+            }
+            true
+        });
+    fault "visualization-of-a-coming-state" ["VIS-04"] "Its visualization names a state that it has not sent yet."
+        => visualization(|_, m| number(m, "referenceStateHeaderId", |id| id + 50.0));
+    fault "visualization-of-the-first-state" ["VIS-04"] "Its visualization names the first state that it has ever sent."
+        => visualization(|_, m| m.set("referenceStateHeaderId", 0));
+
+    fault "lost-without-an-error" ["STATE-MSG-19"] "It says that it is not localized and reports no error."
+        => raising(|_, cause, _| !matches!(cause, Cause::Lost));
+    fault "lost-as-a-warning" ["STATE-MSG-19"] "It reports a lost position as a WARNING."
+        => raising(|_, cause, error| {
+            if matches!(cause, Cause::Lost) {
+                error.fatal = false;
+                error.error_type.push_str("_SUSPECTED");
+            }
+            true
+        });
+    fault "drives-blind" ["STATE-MSG-19"] "It drives on although it cannot tell where it is."
+        => drives(Hindrance::Lost, |_| true);
+    fault "localized-by-force" ["STATE-MSG-19"] "It goes on saying that it is localized while it reports that it is not."
+        => position(|_, m| m.set("positionInitialized", true));
+}

@@ -1,0 +1,197 @@
+//! Deviations of what a vehicle does in zones (sections 6.4.1, 6.4.4 and 6.4.5).
+
+use crate::agv::hook_points::Passage;
+use crate::agv::report::{Changes, Telling};
+use crate::agv::zones::ZoneKind;
+
+use super::prelude::*;
+
+/// Whether an error is about something else than being where the vehicle must not be.
+fn is_other(agv: &Agv, error: &ActiveError) -> bool {
+    error.error_type != agv.config.errors.blocked_zone
+}
+
+records! {
+    fault "blocked-zone-entered" ["ZONE-05", "ZONE-02", "ZINT-01"] "Drives into BLOCKED zones."
+        => forbidding(|_, what| match what {
+            Permission::StayOut(zone) => zone.kind == ZoneKind::Blocked,
+            _ => false,
+        });
+    fault "blocked-zones-unseen" ["ZONE-05", "ZONE-06", "ZONE-02", "ZINT-01"] "Takes no notice of BLOCKED zones."
+        => forbidding(|_, what| matches!(what, Permission::HeedZone(zone) if zone.kind == ZoneKind::Blocked));
+    fault "blocked-zone-by-centre" ["ZONE-03", "ZONE-05"] "Counts as outside a BLOCKED zone until its kinematic centre is inside."
+        => forbidding(|_, what| matches!(what, Permission::GoByContour(zone) if zone.kind == ZoneKind::Blocked));
+    fault "blocked-zone-left-driving" ["ZONE-06"] "Drives on in a BLOCKED zone that is enabled where it is."
+        => forbidding(|_, what| matches!(what, Permission::StopInZone));
+    fault "blocked-zone-silent" ["ZONE-06"] "Stops in a BLOCKED zone, and reports no error."
+        => raising(|agv, _, error| is_other(agv, error));
+    fault "blocked-zone-warning" ["ZONE-06"] "Reports a WARNING when it is inside a BLOCKED zone."
+        => error(|agv, error, words| if !is_other(agv, error) {
+            words.set("errorLevel", "WARNING");
+        });
+    fault "blocked-zone-unnamed" ["ZONE-06"] "Does not say in which BLOCKED zone it is."
+        => raising(|agv, _, error| {
+            if !is_other(agv, error) {
+                error.references.clear();
+            }
+            true
+        });
+    fault "blocked-zone-error-brief" ["ZONE-06"] "Takes the error of a BLOCKED zone back while it is still inside."
+        => raising(|agv, _, error| {
+            if !is_other(agv, error) {
+                error.life = Life::Until(agv.moment() + brief(agv));
+            }
+            true
+        });
+    fault "blocked-zone-error-stays" ["ZONE-06"] "Never takes the error of a BLOCKED zone back."
+        => raising(|agv, _, error| {
+            if !is_other(agv, error) {
+                error.life = Life::Always;
+            }
+            true
+        });
+    fault "disabled-zone-set-enforced" ["ZSET-12"] "Heeds the zones of sets that are not enabled."
+        => letting(|_, what| matches!(what, Permission::ApplyZoneSet(_)));
+    fault "zone-set-applies-to-new-orders" ["ZSET-12", "ZONE-06", "ZERR-01"] "Heeds a zone set only from the next order on after it was enabled."
+        => keep::<Vec<String>>()
+            .allows(|known, _, what, usual| match what {
+                Permission::ApplyZoneSet(set) => usual && known.contains(&set.id),
+                _ => usual,
+            })
+            .happens(|known, agv, event| if event == Event::Begun {
+                *known = agv.zone_sets.all.iter().filter(|set| set.enabled).map(|set| set.id.clone()).collect();
+            });
+
+    fault "zone-speed-ignored" ["ZONE-17", "ZINT-04", "ZINT-08"] "Takes no notice of SPEED_LIMIT zones."
+        => forbidding(|_, what| matches!(what, Permission::HeedZone(zone) if matches!(zone.kind, ZoneKind::SpeedLimit(_))));
+    fault "zone-speed-by-centre" ["ZINT-08", "ZONE-03", "ZONE-17"] "Keeps the speed of a SPEED_LIMIT zone only while its kinematic centre is inside."
+        => forbidding(|_, what| matches!(what, Permission::GoByContour(zone) if matches!(zone.kind, ZoneKind::SpeedLimit(_))));
+    fault "highest-zone-speed-taken" ["ZINT-04", "ZONE-17"] "Of overlapping SPEED_LIMIT zones it keeps the highest speed."
+        => forbidding(|agv, what| match what {
+            Permission::HeedZone(zone) => match zone.kind {
+                ZoneKind::SpeedLimit(speed) => agv.zone_sets.all.iter().filter(|set| set.enabled).any(|set| set.zones.iter().any(|other| {
+                    matches!(other.kind, ZoneKind::SpeedLimit(higher) if higher > speed) && other.area.touches(&zone.area)
+                })),
+                _ => false,
+            },
+            _ => false,
+        });
+
+    fault "zone-actions-left-out" ["ZONE-18", "ZACT-STATE-02", "ZINT-05"] "Does nothing of what ACTION zones ask for."
+        => forbidding(|_, what| matches!(what, Permission::ActInZone(..)));
+    fault "zone-exit-actions-left-out" ["ZONE-18"] "Does not do what an ACTION zone asks for at its exit."
+        => forbidding(|_, what| matches!(what, Permission::ActInZone(_, Passage::Exit)));
+    fault "zone-entry-actions-left-out" ["ZONE-18"] "Does not do what an ACTION zone asks for at its entry."
+        => forbidding(|_, what| matches!(what, Permission::ActInZone(_, Passage::Entry)));
+    fault "zone-actions-inside-left-out" ["ZONE-18"] "Does not do what an ACTION zone asks for while it is inside."
+        => forbidding(|_, what| matches!(what, Permission::ActInZone(_, Passage::During)));
+    fault "only-one-action-zone-heeded" ["ZINT-05"] "Of overlapping ACTION zones it does what one of them asks for."
+        => forbidding(|agv, what| match what {
+            Permission::ActInZone(zone, _) => agv.heeding.inside.iter().any(|(_, other)| {
+                matches!(other.kind, ZoneKind::Action { .. }) && other.id < zone.id && other.area.touches(&zone.area)
+            }),
+            _ => false,
+        });
+    fault "zone-actions-among-those-of-the-order" ["IACT-STATE-03", "ZACT-STATE-02"] "Lists actions of zones in actionStates as well."
+        => state(|_, words| {
+            let of_zones = words.get("zoneActionStates").and_then(Value::as_array).cloned().unwrap_or_default();
+            words.change("actionStates", |all| if let Value::Array(all) = all {
+                all.extend(of_zones);
+            });
+        });
+    fault "zone-action-ids-repeated" ["ZACT-STATE-03"] "Gives an action of a zone the same actionId each time."
+        => action(|_, action, words| {
+            if action.of_zone() {
+                words.set("actionId", format!("zone-{}", action.request.action_type));
+            }
+            true
+        });
+    fault "zone-action-without-type" ["ZACT-STATE-03"] "Does not say of which type an action of a zone is." because "The ruling of ZACT-STATE-03 is a warning."
+        => action(|_, action, words| {
+            if action.of_zone() {
+                words.remove("actionType");
+            }
+            true
+        });
+    fault "zone-actions-not-listed" ["ZACT-STATE-01", "ZACT-STATE-02"] "Has no list of the actions of zones."
+        => state(|_, words| {
+            words.remove("zoneActionStates");
+        });
+    fault "zone-actions-forgotten-with-the-order" ["ZACT-STATE-04"] "Forgets the actions of zones that have ended when it takes over a new order."
+        => when(Event::Begun, |agv| agv.actions.retain(|action| !action.of_zone() || !action.status.is_terminal()));
+    fault "zone-actions-forgotten-when-done" ["ZACT-STATE-04", "ZACT-STATE-02"] "Does not list an action of a zone any more once it has ended."
+        => action(|_, action, _| !action.of_zone() || !action.status.is_terminal());
+    fault "clear-zone-actions-without-effect" ["ZACT-STATE-05"] "Reports clearZoneActions FINISHED and removes nothing."
+        => instead(Effect::ClearZoneActions, |_, _| Some(Outcome::Done(None)));
+    fault "clear-zone-actions-takes-running" ["ZACT-STATE-05"] "Removes actions of zones that have not ended as well."
+        => succeeded(Effect::ClearZoneActions, |agv, _| agv.actions.retain(|action| !action.of_zone()));
+    fault "clear-instant-actions-takes-those-of-zones" ["ZACT-STATE-04"] "On clearInstantActions it removes actions of zones, too."
+        => succeeded(Effect::ClearInstantActions, |agv, _| agv.actions.retain(|action| !action.of_zone()));
+    fault "zone-action-change-not-told" ["STATE-09"] "Says how far actions of zones are with the next periodic state only."
+        => keep::<Vec<Status>>().tells(|before, agv, changes, requested| {
+            let now: Vec<Status> = agv.actions.iter().filter(|action| action.of_zone()).map(|action| action.status).collect();
+            let changed = *before != now;
+            *before = now;
+            let alone = Changes { actions: true, ..Changes::default() };
+            if changed && changes == alone && !requested { Telling::Never } else { Telling::Now }
+        });
+    fault "zone-action-occupies" ["ORD-17"] "Counts as busy while an action of a zone runs."
+        => letting(|agv, what| {
+            let open = |action: &Action| action.of_zone() && !action.status.is_terminal();
+            matches!(what, Permission::BeBusy) && agv.actions.iter().any(open)
+        });
+
+    fault "directed-zones-ignored" ["ZONE-21", "ZONE-04"] "Takes no notice of DIRECTED zones."
+        => forbidding(|_, what| matches!(what, Permission::HeedZone(zone) if matches!(zone.kind, ZoneKind::Directed(..))));
+    fault "bidirected-zones-ignored" ["ZONE-23", "ZONE-04"] "Takes no notice of BIDIRECTED zones."
+        => forbidding(|_, what| matches!(what, Permission::HeedZone(zone) if matches!(zone.kind, ZoneKind::Bidirected(..))));
+    fault "line-guided-zones-entered-freely" ["ZONE-08"] "Drives into LINE_GUIDED zones on edges without a trajectory."
+        => forbidding(|_, what| matches!(what, Permission::StayOut(zone) if zone.kind == ZoneKind::LineGuided));
+    fault "direction-before-trajectory" ["ZINT-07"] "Does not drive a trajectory that leads against the direction of a zone."
+        => allowing(|_, what, usual| match what {
+            Permission::StayOut(zone) => usual || matches!(zone.kind, ZoneKind::Directed(..) | ZoneKind::Bidirected(..)),
+            _ => usual,
+        });
+    fault "line-guided-zones-cut" ["ZONE-07", "ZINT-02"] "Does not follow trajectories in LINE_GUIDED zones."
+        => plain().bends(|_, agv, _, path| {
+            let zones = agv.zone_sets.all.iter().filter(|set| set.enabled).flat_map(|set| &set.zones);
+            let guided = zones.into_iter().any(|zone| zone.kind == ZoneKind::LineGuided);
+            (!guided).then_some(path)
+        });
+    fault "zone-action-conflict-unseen" ["ZINT-03"] "Does what a zone asks for although that breaks the rule of a LINE_GUIDED zone."
+        => forbidding(|_, what| matches!(what, Permission::SeeConflict));
+    fault "zone-action-conflict-silent" ["ZINT-03"] "Stops for actions of zones that conflict, and reports no error."
+        => raising(|agv, _, error| error.error_type != agv.config.errors.zone_action_conflict);
+
+    fault "unreachable-node-silent" ["ZERR-01"] "Stands before a zone that keeps it from its node, and says nothing."
+        => raising(|agv, _, error| error.error_type != agv.config.errors.node_unreachable);
+    fault "unreachable-node-unnamed" ["ZERR-01"] "Does not say which node is out of reach."
+        => raising(|agv, _, error| {
+            if error.error_type == agv.config.errors.node_unreachable {
+                error.references.clear();
+            }
+            true
+        });
+    fault "unreachable-node-warning" ["ZERR-01"] "Reports a WARNING when a node is out of reach."
+        => error(|agv, error, words| if error.error_type == agv.config.errors.node_unreachable {
+            words.set("errorLevel", "WARNING");
+        });
+    fault "unreachable-node-error-brief" ["ZERR-01"] "Takes the error of a node out of reach back after a moment."
+        => plain().happens(|_, agv, event| if event == Event::StateSent {
+            let name = agv.config.errors.node_unreachable.clone();
+            agv.errors.active.retain(|error| error.error_type != name);
+        });
+    fault "unreachable-node-error-stays" ["ZERR-01"] "Keeps the error of a node out of reach when a new order is accepted."
+        => plain().happens(|_, agv, _| {
+            let name = agv.config.errors.node_unreachable.clone();
+            agv.errors.active.iter_mut().filter(|error| error.error_type == name).for_each(|error| error.life = Life::Always);
+        });
+    fault "unreachable-node-tried-again" ["ZERR-02"] "Drives on to a node that was out of reach as soon as the way is free."
+        => letting(|_, what| matches!(what, Permission::TryAgain));
+    fault "no-order-after-unreachable-node" ["ERR-07"] "Refuses every order once a node was out of reach, even when the order before was cancelled."
+        => objecting(|agv, _, relation| {
+            let name = &agv.config.errors.node_unreachable;
+            let listed = agv.errors.active.iter().any(|error| error.error_type == *name);
+            (listed && relation == Relation::New).then(|| Refusal::new(Rule::OtherOrderActive, "a node was out of reach"))
+        });
+}

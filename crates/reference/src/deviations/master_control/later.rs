@@ -1,0 +1,130 @@
+//! Deviations of what only later versions ask of a master control: sleep, triggers, retries, lists that are cleared, orders that
+//! begin with update 0, certificates.
+
+use super::prelude::*;
+
+records! {
+    fault "new-order-counts-from-one" ["ORD-UPD-14"] "Its orders begin with orderUpdateId 1."
+        => planned(|_, _, running| running.update_id = 1);
+    fault "new-order-counts-on" ["ORD-UPD-14"] "orderUpdateId counts on over all orders of a vehicle instead of beginning with 0."
+        => keep::<u32>().happens(|count, _, _, event| match event {
+            Event::Planned(running) => running.update_id = *count,
+            Event::Ended(running, _) => *count = running.update_id + 1,
+            _ => {}
+        });
+    fault "first-node-not-released" ["ORD-14", "ORD-09"] "The first node of a new order is not released."
+        => new_order(|m| m.each("nodes", |node| if node.says("sequenceId", 0) { node.set("released", false); }));
+    fault "cancel-names-another-order" ["ORD-CANCEL-23"] "The orderId that cancelOrder names has a letter too many."
+        because "The ruling of ORD-CANCEL-23 makes an orderId that the vehicle does not report a warning."
+        => naming_in("cancelOrder", "orderId", |id| json!(format!("{}x", id.as_str().unwrap_or_default())));
+    fault "instant-action-blocks-all" ["IACT-08"] "Its instant actions have the blockingType HARD."
+        => action_of("instantActions", |a| a.set("blockingType", "HARD"));
+    fault "instant-action-blocks-softly" ["IACT-08"] "cancelOrder has the blockingType SOFT."
+        => typed("cancelOrder", |a| a.set("blockingType", "SOFT"));
+    fault "retriable-as-text" ["ORD-MSG-35"] "Says retriable of actions as a text."
+        => action(|a| a.change("retriable", |retriable| *retriable = json!(retriable.to_string())));
+    fault "turned-before-every-edge" ["ORD-MSG-34", "OPT-03"] "It has every vehicle turn to its orientation before each edge."
+        => edge(|e| e.set("reachOrientationBeforeEntering", true));
+    fault "orientation-always-global" ["ORD-MSG-34"] "Edges have an orientation on the map for every kind of vehicle."
+        because "The ruling of ORD-MSG-34 makes it a warning where the factsheet lists the field, as that of the vehicles does."
+        => edge(|e| {
+            e.set("orientation", 0.0);
+            e.set("orientationType", "GLOBAL");
+        });
+    fault "ellipse-lies-across" ["ORD-MSG-09"] "The half axis a of allowedDeviationXY is less than b."
+        because "The ruling of ORD-MSG-09 makes an a that is less than b a warning."
+        => position(|p| p.change("allowedDeviationXY", |allowed| if let Some(radius) = allowed.as_f64() {
+            *allowed = json!({ "a": radius, "b": radius * 2.0, "theta": 0.0 });
+        }));
+    fault "orders-to-the-sleeping" ["HIB-13"] "It sends orders to a vehicle that sleeps."
+        => letting(|_, vehicle, what| asleep(vehicle) && matches!(what, Permission::Reach));
+    fault "actions-to-the-sleeping" ["HIB-13"] "It sends instant actions to a vehicle that sleeps, as to one that is awake."
+        => letting(|_, vehicle, what| asleep(vehicle) && matches!(what, Permission::Tell(_)));
+    fault "sleep-taken-for-a-fault" ["HIB-14", "HIB-13"] "It calls off what a vehicle has to do when that sleeps and is silent."
+        => keep::<bool>().happens(|done, site, vehicle, event| if let Event::Looked = event {
+            if asleep(vehicle) && !std::mem::replace(done, true) {
+                site.instant_all_the_same(vehicle, "cancelOrder", &Value::Null);
+            }
+            *done &= asleep(vehicle);
+        }).allows(|_, _, vehicle, what, usual| usual || asleep(vehicle) && matches!(what, Permission::Tell("cancelOrder")));
+    fault "shuts-down-the-sleeping" ["SHUT-03", "HIB-13"] "It sends shutdown to a vehicle that sleeps without waking it."
+        => allowing(|vehicle, what, usual| match what {
+            Permission::Tell("shutdown") if asleep(vehicle) => true,
+            Permission::Wake if vehicle.instants.iter().any(|instant| instant.kind() == "shutdown") => false,
+            _ => usual,
+        });
+    fault "lists-never-cleared" ["IACT-STATE-07"] "It never has the list of instant actions cleared."
+        because "IACT-STATE-07 is a recommendation."
+        => forbidding(|_, _, what| matches!(what, Permission::Clear("clearInstantActions")));
+    fault "certificate-over-http" ["CERT-05"] "The links of updateCertificate are without TLS."
+        => parameter(|kind, p| if kind == "updateCertificate" {
+            p.change("value", |link| *link = json!(link.as_str().unwrap_or_default().replace("https:", "http:")));
+        });
+    fault "certificate-for-its-own-service" ["CERT-05"] "updateCertificate names the service of the broker connection BROKER."
+        => parameter(|kind, p| if kind == "updateCertificate" && p.says("key", "service") { p.set("value", "BROKER"); });
+    fault "certificate-without-key" ["CERT-05", "ACT-31", "FACT-15"] "updateCertificate comes without keyDownloadLink."
+        => typed("updateCertificate", |a| a.keep("actionParameters", |parameter| !parameter.says("key", "keyDownloadLink")));
+    fault "retry-names-no-action" ["RETRY-08", "ACT-31", "FACT-15"] "retry and skipRetry name no action."
+        => action(|a| if matches!(a.text("actionType"), "retry" | "skipRetry") { a.unset("actionParameters"); });
+    fault "retry-names-itself" ["RETRY-08"] "retry names its own actionId."
+        => typed("retry", |a| {
+            let own = a["actionId"].clone();
+            a.each("actionParameters", |parameter| parameter.set("value", own.clone()));
+        });
+    fault "skip-names-another-action" ["RETRY-08"] "skipRetry names an action that there is not."
+        => typed("skipRetry", |a| a.each("actionParameters", |parameter| parameter.set("value", "action-0")));
+    fault "trigger-type-as-text" ["ACT-31", "BP-05", "FACT-15"] "triggerType is a text and not a list of texts."
+        => parameter_of("triggerType", |p| p.change("value", |value| if let Some(first) = value.get(0).cloned() { *value = first; }));
+    fault "trigger-type-in-its-own-words" ["TRIG-03"] "It calls its own trigger FLEET and that at the vehicle BUTTON."
+        => parameter_of("triggerType", |p| p.change("value", |value| for name in value.as_array_mut().into_iter().flatten() {
+            match name.as_str() {
+                Some("FLEET_CONTROL") => *name = json!("FLEET"),
+                Some("LOCAL") => *name = json!("BUTTON"),
+                _ => {}
+            }
+        }));
+    fault "trigger-never-given" ["TRIG-04"] "It does not send trigger when the process is done that was awaited."
+        => asked("give-trigger", |_, _, _| false);
+    fault "trigger-by-the-order-topic" ["TRIG-04"] "It ends the wait for a trigger by calling the order off."
+        => asked("give-trigger", |site, vehicle, _| {
+            site.call_off(vehicle);
+            false
+        });
+    fault "commands-a-vehicle-in-someones-hands" ["MODE-11"] "It sends instant actions to a vehicle in INTERVENED."
+        => letting(|_, vehicle, what| mode(vehicle) == "INTERVENED" && matches!(what, Permission::Tell(_)));
+    fault "startup-ignored" ["MODE-04"] "It takes STARTUP for AUTOMATIC."
+        => letting(|_, vehicle, what| mode(vehicle) == "STARTUP" && matches!(what, Permission::Command));
+    fault "critical-charge-ignored" ["FACT-17"] "It begins a transport however low the battery is."
+        because "FACT-17 is a recommendation."
+        => forbidding(|_, _, what| matches!(what, Permission::Starve));
+    tolerance "lists-cleared-late" ["IACT-STATE-07"] "It has the list of instant actions cleared only when the vehicle has nothing to do."
+        => forbidding(|_, vehicle, what| vehicle.running.is_some() && matches!(what, Permission::Clear(_)));
+    tolerance "cancels-without-name" ["ORD-CANCEL-23"] "cancelOrder names no order."
+        => typed("cancelOrder", |a| a.unset("actionParameters"));
+    tolerance "never-asks-for-retries" ["ORD-MSG-35"] "It sends no action as retriable."
+        => action(|a| a.unset("retriable"));
+}
+
+/// Whether the vehicle sleeps.
+fn asleep(vehicle: &Vehicle) -> bool {
+    vehicle.presence == Presence::Asleep
+}
+
+type Naming = (&'static str, &'static str, fn(&Value) -> Value);
+
+/// Gives one parameter of one type of action another value.
+fn naming_in(kind: &'static str, key: &'static str, change: fn(&Value) -> Value) -> Box<dyn Deviation> {
+    let held: Naming = (kind, key, change);
+    holding(held).sends(|(kind, key, change), _, _, outgoing| {
+        each_action(&mut outgoing.message, |action| {
+            if action.says("actionType", *kind) {
+                action.each("actionParameters", |parameter| {
+                    if parameter.says("key", *key) {
+                        parameter.change("value", |value| *value = change(value));
+                    }
+                });
+            }
+        });
+        true
+    })
+}

@@ -1,0 +1,102 @@
+//! Deviations of what is said to requests of vehicles (sections 6.4.3, 6.6.10 and 6.9).
+
+use super::prelude::*;
+
+records! {
+    fault "requests-unanswered" ["REQ-03"] "It answers no request."
+        => deciding(|_, _, _, _| None);
+    fault "zone-requests-unanswered" ["REQ-03"] "It answers requests for corridors only."
+        => deciding(|_, _, claim, usual| usual.filter(|_| !is_zone(claim)));
+    fault "corridor-requests-unanswered" ["REQ-03", "CORR-21"] "It answers requests for zones only."
+        => deciding(|_, _, claim, usual| usual.filter(|_| is_zone(claim)));
+    fault "later-requests-unanswered" ["REQ-03", "CORR-21"] "Of several requests of a vehicle it answers the first one."
+        => deciding(|site, vehicle, claim, usual| {
+            let name = vehicle.name();
+            let others = site.claims.all.iter().filter(|other| other.whose == name && other.id != claim.id);
+            usual.filter(|_| others.into_iter().all(|other| other.said.is_none()))
+        });
+    fault "response-type-for-grant-type" ["REQ-04"] "It calls the grantType of a response responseType."
+        => response(|answer| answer.rename("grantType", "responseType"));
+    fault "grant-type-in-other-words" ["REQ-04"] "It answers with ACCEPTED where it grants something."
+        => response(|answer| if answer.says("grantType", "GRANTED") { answer.set("grantType", "ACCEPTED") });
+    fault "response-without-a-list" ["REQ-04"] "A message with one response has it in the place of the list."
+        => responses(|m| m.change("responses", |list| if let Some(first) = list.get(0).cloned() { *list = first }));
+    fault "response-without-id" ["REQ-04"] "Responses do not say which request they answer."
+        => response(|answer| answer.unset("requestId"));
+    fault "two-answers-to-one-request" ["REQ-04"] "The message that grants something also says that the request is queued."
+        => responses(|m| {
+            let granted = m.list("responses").iter().find(|answer| answer["grantType"] == "GRANTED").map(|answer| answer["requestId"].clone());
+            if let Some(id) = granted { m.add("responses", json!({ "requestId": id, "grantType": "QUEUED" })) }
+        });
+    fault "lease-of-what-is-not-granted" ["REQ-05"] "It says until when a request that is queued is valid."
+        => response(|answer| if answer.says("grantType", "QUEUED") { answer.set("leaseExpiry", "2099-01-01T00:00:00.000Z") });
+    fault "lease-in-seconds" ["REQ-05"] "leaseExpiry is a number of seconds."
+        => response(|answer| answer.change("leaseExpiry", |end| *end = json!(20)));
+    fault "lease-in-local-time" ["REQ-05"] "leaseExpiry is in local time, two hours ahead, and says so."
+        => response(|answer| answer.change("leaseExpiry", |end| *end = json!(end.as_str().unwrap_or_default().replace('Z', "+02:00"))));
+    fault "lease-already-over" ["REQ-05"] "The lease of a grant has ended an hour before it comes."
+        because "A time that has passed is a warning by the catalogue."
+        => holding(()).sends(|(), site, _, outgoing| {
+            let over = site.now.utc.checked_sub(jiff::SignedDuration::from_hours(1)).unwrap_or(site.now.utc);
+            outgoing.message.each("responses", |answer| answer.change("leaseExpiry", |end| *end = json!(format!("{over:.3}"))));
+            true
+        });
+    fault "lease-prolonged-under-another-id" ["REQ-11"] "It prolongs a lease by a response with a requestId of its own."
+        => fleet::<BTreeSet<String>>().sends(|granted, _, _, outgoing| {
+            outgoing.message.each("responses", |answer| {
+                let id = answer.text("requestId").to_owned();
+                if answer.says("grantType", "GRANTED") && !granted.insert(id.clone()) {
+                    answer.set("requestId", format!("{id}-again"));
+                }
+            });
+            true
+        });
+    fault "responses-nobody-asked-for" ["REQ-18"] "It grants a vehicle the way with each new order, before the vehicle asks for anything."
+        because "That a response comes unasked is a warning by the catalogue."
+        => begun(|site, vehicle| site.publish(vehicle, "responses", &json!({ "responses": [{ "requestId": "way-1", "grantType": "GRANTED" }] })));
+    fault "corridors-of-the-horizon-granted" ["CORR-22"] "It grants corridors of edges that are not released."
+        => deciding(|_, _, claim, usual| match usual {
+            Some(Grant::Queued) if !is_zone(claim) => Some(Grant::Granted),
+            usual => usual,
+        });
+    fault "revoked-zone-given-away" ["ZREQ-17"] "It gives a zone to the next vehicle as soon as it has revoked it from the one before."
+        => allowing(|_, what, usual| match what {
+            Permission::Occupied(claim) => usual && claim.said != Some(Grant::Revoked),
+            _ => usual,
+        });
+    fault "zone-given-twice" ["ZREQ-18"] "It gives a zone to two vehicles at a time."
+        because "That a zone is used by one vehicle at a time is not demanded; the catalogue makes it a warning."
+        => forbidding(|_, _, what| matches!(what, Permission::Occupied(_)));
+    fault "base-extended-outside-the-corridor" ["CORR-23"] "It extends the base of a vehicle that stands outside its corridor."
+        because "The catalogue records what a fleet control does then, and makes this a warning."
+        => letting(|_, _, what| matches!(what, Permission::Extend(_)));
+    tolerance "grants-for-good" ["REQ-05", "REQ-11"] "Its grants have no end."
+        => plain().lasts(|(), _, _, what, usual| if matches!(what, Span::Lease) { Duration::ZERO } else { usual });
+    tolerance "grants-never-prolonged" ["REQ-11"] "It prolongs no grant."
+        => forbidding(|_, _, what| matches!(what, Permission::Prolong));
+    tolerance "queued-before-granted" ["REQ-03", "REQ-04"] "Every request waits in a queue first, if only for a moment."
+        => deciding(|_, vehicle, claim, usual| match (claim.said, usual) {
+            (None, Some(Grant::Granted)) => {
+                vehicle.at(Moment::START);
+                Some(Grant::Queued)
+            }
+            _ => usual,
+        });
+    tolerance "corridors-of-the-horizon-refused" ["CORR-22"] "It rejects requests for corridors of edges that are not released."
+        => deciding(|_, _, claim, usual| match usual {
+            Some(Grant::Queued) if !is_zone(claim) => Some(Grant::Rejected),
+            usual => usual,
+        });
+}
+
+type Deciding = fn(&Site, &mut Vehicle, &Claim, Option<Grant>) -> Option<Grant>;
+
+/// Answers requests otherwise.
+fn deciding(change: Deciding) -> Box<Hooks<Deciding>> {
+    holding(change).decides(|change, site, vehicle, claim, usual| change(site, vehicle, claim, usual))
+}
+
+/// Whether a request is about a zone.
+fn is_zone(claim: &Claim) -> bool {
+    matches!(claim.wish, Wish::Zone { .. })
+}

@@ -1,0 +1,153 @@
+//! Where the zones of a test lie: round a node of its course, or along an edge of it, as large as the vehicle and the nodes beside
+//! it leave room for.
+
+use std::collections::BTreeSet;
+use std::f64::consts::PI;
+
+use serde_json::{Value, json};
+
+use tck_base::polygon::{Point, Polygon};
+use tck_journal::Reason;
+use tck_view::FactsheetView;
+use tck_world::outline::radius;
+
+/// A zone reaches so far beyond its node or its edge, in metres, where there is room.
+const REACH: f64 = 0.5;
+
+/// A zone that reaches less far is too small to be seen on the way.
+const LEAST: f64 = 0.2;
+
+/// A vehicle on another node stays so far from a zone, in metres.
+const APART: f64 = 0.15;
+
+/// The size of a vehicle that does not say how large it is, from its centre, in metres.
+const UNSAID: f64 = 1.0;
+
+/// Corners of a zone round a node.
+const CORNERS: u32 = 8;
+
+fn round(number: f64) -> f64 {
+    (number * 1_000.0).round() / 1_000.0
+}
+
+fn place(course: &Value, name: &str) -> Option<Point> {
+    let node = course.get("nodes")?.get(name)?;
+    Some(Point::new(node.get("x")?.as_f64()?, node.get("y")?.as_f64()?))
+}
+
+/// The corners about a node, or about the way between two, counter-clockwise.
+fn corners(from: Point, to: Point, reach: f64) -> Vec<Point> {
+    let length = from.distance(to);
+    if length < 1e-6 {
+        let corner = |index: u32| {
+            let angle = 2.0 * PI * (f64::from(index) + 0.5) / f64::from(CORNERS);
+            Point::new(from.x + reach * angle.cos(), from.y + reach * angle.sin())
+        };
+        return (0..CORNERS).map(corner).collect();
+    }
+    let (along, aside) = (
+        ((to.x - from.x) / length * reach, (to.y - from.y) / length * reach),
+        ((to.y - from.y) / length * reach, -(to.x - from.x) / length * reach),
+    );
+    let corner = |at: Point, sign: f64, side: f64| {
+        Point::new(
+            at.x + sign * along.0 + side * aside.0,
+            at.y + sign * along.1 + side * aside.1,
+        )
+    };
+    vec![
+        corner(from, -1.0, 1.0),
+        corner(to, 1.0, 1.0),
+        corner(to, 1.0, -1.0),
+        corner(from, -1.0, -1.0),
+    ]
+}
+
+/// The largest zone about a node or an edge that a vehicle on another node of the course is clear of.
+fn area(course: &Value, name: &str, size: f64) -> Option<Vec<Point>> {
+    let (from, to) = name.split_once('-').unwrap_or((name, name));
+    let (begin, end) = (place(course, from)?, place(course, to)?);
+    let nodes = course.get("nodes")?.as_object()?;
+    let others = nodes.keys().filter(|other| *other != from && *other != to);
+    let others: Vec<Point> = others
+        .filter_map(|other| place(course, other))
+        .filter(|other| other.distance(begin).min(other.distance(end)) > 1e-3)
+        .collect();
+    let mut reach = REACH;
+    while reach >= LEAST {
+        let corners = corners(begin, end, reach);
+        let polygon = Polygon::new(corners.clone()).ok()?;
+        let clear = |other: &Point| -polygon.depth(*other) >= size + APART;
+        if others.iter().all(clear) {
+            return Some(corners);
+        }
+        reach -= 0.05;
+    }
+    None
+}
+
+/// Gives these nodes and edges of a course the corners of a zone, as `zone`.
+///
+/// # Errors
+/// Why there is no room for one.
+pub(super) fn put(
+    course: &mut Value,
+    names: &BTreeSet<String>,
+    factsheet: Option<&FactsheetView>,
+) -> Result<(), Reason> {
+    let size = factsheet.and_then(radius).unwrap_or(UNSAID);
+    for name in names {
+        let Some(corners) = area(course, name, size) else {
+            let why =
+                format!("the nodes of the course are too near to each other for a zone and a vehicle of {size:.1} m");
+            return Err(Reason::observed(why));
+        };
+        let group = if name.contains('-') { "edges" } else { "nodes" };
+        let corners = corners
+            .iter()
+            .map(|corner| json!({ "x": round(corner.x), "y": round(corner.y) }));
+        if let Some(Value::Object(members)) = course.get_mut(group).and_then(|group| group.get_mut(name)) {
+            members.insert("zone".to_owned(), corners.collect());
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn course() -> Value {
+        json!({
+            "nodes": { "a": { "x": 0.0, "y": 0.0 }, "b": { "x": 2.0, "y": 0.0 }, "c": { "x": 4.0, "y": 0.0 } },
+            "edges": { "a-b": {}, "b-c": {} },
+        })
+    }
+
+    fn zone(names: &[&str], size: f64) -> Result<Value, Reason> {
+        let mut course = course();
+        for name in names {
+            let corners = area(&course, name, size).ok_or_else(|| Reason::observed("no room"))?;
+            let polygon = Polygon::new(corners).unwrap();
+            assert!(polygon.is_counter_clockwise());
+        }
+        let names = names.iter().map(|name| (*name).to_owned()).collect();
+        put(&mut course, &names, None)?;
+        Ok(course)
+    }
+
+    #[test]
+    fn a_zone_lies_about_its_node_or_its_edge_and_leaves_the_others_free() {
+        let course = zone(&["b", "b-c"], 0.72).unwrap();
+        let about = Polygon::read(&course["nodes"]["b"]["zone"]).unwrap();
+        assert!(about.contains(Point::new(2.0, 0.0)) && !about.contains(Point::new(1.4, 0.0)));
+        let along = Polygon::read(&course["edges"]["b-c"]["zone"]).unwrap();
+        assert!(along.contains(Point::new(4.2, 0.1)) && !along.contains(Point::new(1.4, 0.0)));
+    }
+
+    #[test]
+    fn a_large_vehicle_among_near_nodes_gets_none() {
+        assert!(area(&course(), "b", 1.7).is_none());
+        assert!(area(&course(), "x", 0.5).is_none());
+    }
+}
