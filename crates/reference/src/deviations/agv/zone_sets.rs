@@ -182,7 +182,7 @@ records! {
             agv.zone_set_received(message.to_string().as_bytes());
             false
         });
-    fault "undeclared-zone-silent" ["ZSET-26"] "Takes a zone set over with a kind of zone that it does not declare, and says nothing." because "A recommendation."
+    fault "undeclared-zone-silent" ["ZSET-26"] "Takes a zone set over with a kind of zone that it does not declare, and says nothing." because "It breaks a recommendation only."
         => letting(|_, what| matches!(what, Permission::TakeZoneUnheeded));
     fault "unknown-zone-type-declared" ["ZONE-01"] "Declares a kind of zone that there is not."
         => factsheet(|_, words| words.change("typeSpecification", |kind| kind["supportedZones"] = json!(["BLOCKED", "SLOW"])));
