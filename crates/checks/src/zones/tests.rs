@@ -132,7 +132,10 @@ fn travel_against_a_direction_is_found_and_travel_along_it_is_not() {
     assert_eq!(driven(&directed(3.1, "RESTRICTED")), ["ZONE-21"]);
     assert_eq!(driven(&directed(2.2, "RESTRICTED")), ["ZONE-21 warning"]);
     assert_eq!(driven(&directed(1.0, "STRICT")), ["ZONE-21"]);
-    assert_eq!(driven(&directed(3.1, "SOFT")), ["ZONE-22 warning"]);
+    assert!(
+        driven(&directed(3.1, "SOFT")).is_empty(),
+        "nobody knows whether there was another way"
+    );
     let both = zone(
         "BIDIRECTED",
         &json!({ "direction": 3.1, "bidirectedLimitation": "RESTRICTED" }),
