@@ -165,7 +165,7 @@ fn intact(folder: &Path, library: &Library) -> Result<(RunResult, String), Probl
     let journal_path = file::find(folder);
     let Recording { journal, .. } =
         file::read(&journal_path).map_err(|error| Problem::from(Diagnostic::whole("journal", error.to_string())))?;
-    let result = super::report::judged(library, &journal, (folder, &journal_path))?;
+    let result = super::rejudged::judged(library, &journal, (folder, &journal_path))?;
     let path = folder.join("result.json");
     let saved =
         result_file::read(&path).map_err(|error| Problem::from(Diagnostic::whole("result", error.to_string())))?;

@@ -40,6 +40,7 @@ mod qualified;
 mod qualify;
 mod recordings;
 mod reference;
+mod rejudged;
 mod report;
 mod result_bundle;
 mod run;

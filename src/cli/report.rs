@@ -10,11 +10,10 @@ use super::exit::Exit;
 use super::merge;
 use super::outputs::Outputs;
 use super::problem::Problem;
+use super::rejudged::judged;
 use tck_audit::saved;
 use tck_base::diagnostic::Diagnostic;
-use tck_journal::Journal;
 use tck_journal::file::{self, Recording};
-use tck_judge::{self as judge, Library};
 use tck_report::{clean, compare, headline, json as result_file, manifest, overview, side_by_side};
 use tck_result::RunResult;
 use tck_run::{Bundle, sources, write_all};
@@ -103,23 +102,6 @@ pub fn report(arguments: &Report, outputs: &Outputs<'_>) -> Result<Exit, Problem
         }
     };
     Ok(Exit::of(result.verdict))
-}
-
-/// What the journal of a run says, judged again; with the folder of the run, and where its journal is.
-pub(super) fn judged(
-    library: &Library,
-    journal: &Journal,
-    (folder, path): (&Path, &Path),
-) -> Result<RunResult, Problem> {
-    let wrong = |why: &dyn std::fmt::Display| {
-        Problem::from(Diagnostic::whole("journal", format!("{}: {why}", folder.display())))
-    };
-    let mut result = judge::judge(&library.rules, journal.entries()).map_err(|error| wrong(&error))?;
-    if let Some(lost) = journal.lost() {
-        return Err(wrong(lost));
-    }
-    result.journal = file::name_of(path);
-    Ok(result)
 }
 
 fn journal_of(path: &Path) -> Result<Recording, Problem> {

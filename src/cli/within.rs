@@ -104,7 +104,12 @@ fn place(path: &Path, links: usize) -> Option<PathBuf> {
             continue;
         };
         let rest = path.strip_prefix(one).ok()?;
-        return place(&folder.join(target).join(rest), links.checked_sub(1)?);
+        let mut on = folder.join(target);
+        // Nothing joined would still end the path in a separator, behind which no link is read.
+        if !rest.as_os_str().is_empty() {
+            on.push(rest);
+        }
+        return place(&on, links.checked_sub(1)?);
     }
     None
 }

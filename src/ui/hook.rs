@@ -90,7 +90,7 @@ mod tests {
                 "configure",
                 Role::MasterControl,
                 [
-                    "  what     what it is to do otherwise than usual: trigger-timeout, corridors",
+                    "  what     what it is to do otherwise than usual: trigger-timeout, corridors, corridors-with-release",
                     "             trigger-timeout: waitForTrigger is called off after 30 s",
                     "risk        by-hand",
                     "    {\"vehicle\": \"mock-1\", \"what\": \"trigger-timeout\"}",

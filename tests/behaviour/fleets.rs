@@ -214,7 +214,7 @@ fn four_processes_at_two_nodes_of_rabbitmq_are_one_fleet_and_a_killed_one_is_mis
 }
 
 #[test]
-#[ignore = "takes minutes and all of the machine; BENCHMARKS.md has its figures"]
+#[ignore = "takes minutes and all of the machine; BENCHMARKS.md says how it is run"]
 fn five_thousand_vehicles_of_four_processes_at_two_brokers_are_judged_each() {
     let Some(cluster) = Cluster::mosquitto() else { return };
     let fleet = Fleet::before_a_master_control(cluster, 5_000, 4);

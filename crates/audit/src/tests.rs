@@ -112,7 +112,11 @@ fn who_did_nothing_wrong_is_accused_of_nothing_however_bad_the_recording() {
         for pack in library.rules.packs.of_role(role) {
             let whole = traffic(library, pack, role, tests, &[]);
             let judged = audited(library, whole.clone());
-            wrong.extend(found(&judged, role));
+            let mut accuses = |of: &str, result: &AuditResult| {
+                let found = found(result, role).into_iter();
+                wrong.extend(found.map(|text| format!("{role} {} {tests}, {of}: {text}", pack.version)));
+            };
+            accuses("whole", &judged);
             let sides = judged.vehicles.iter().flat_map(|vehicle| &vehicle.sides);
             let mut sides = sides.filter(|side| side.role == role.word());
             assert!(
@@ -120,11 +124,11 @@ fn who_did_nothing_wrong_is_accused_of_nothing_however_bad_the_recording() {
                 "{role} {tests}: hardly anything was judged"
             );
             for seed in 0..12 {
-                wrong.extend(found(&audited(library, spoiled(&whole, seed)), role));
+                accuses(&format!("seed {seed}"), &audited(library, spoiled(&whole, seed)));
             }
             // Whatever was under way when the recording began.
             for begin in (0..whole.len()).step_by(whole.len() / 12 + 1) {
-                wrong.extend(found(&audited(library, whole[begin..].to_vec()), role));
+                accuses(&format!("from {begin}"), &audited(library, whole[begin..].to_vec()));
             }
         }
     }

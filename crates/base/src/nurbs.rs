@@ -23,6 +23,9 @@ pub enum Flaw {
     /// There is no degree; 1 is assumed.
     #[error("degree is missing")]
     DegreeMissing,
+    /// There is no knotVector; even knots are assumed, as many of the first and of the last as the degree and one.
+    #[error("knotVector is missing")]
+    KnotsMissing,
     /// knotVector has a wrong length.
     #[error("knotVector has {found} values; {points} control points of degree {degree} need {wanted}")]
     KnotCount {
@@ -48,6 +51,14 @@ pub enum Flaw {
     KnotOrder(usize),
 }
 
+impl Flaw {
+    /// Whether the member has a usual value, which is taken for it.
+    #[must_use]
+    pub fn has_default(&self) -> bool {
+        matches!(self, Self::DegreeMissing | Self::KnotsMissing)
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct ControlPoint {
     x: f64,
@@ -70,7 +81,7 @@ pub struct Written {
     pub degree: Option<f64>,
     /// The control points; `None` where they are no list.
     pub points: Option<Vec<WrittenPoint>>,
-    /// The knots; `None` where they are no list of numbers.
+    /// The knots; `None` where they are missing, with one that is not a number where they are no list of numbers.
     pub knots: Option<Vec<f64>>,
 }
 
@@ -88,16 +99,21 @@ pub struct WrittenPoint {
 impl From<&Value> for Written {
     fn from(trajectory: &Value) -> Self {
         let float = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
-        let list = |name: &str| trajectory.get(name).and_then(Value::as_array);
+        let there = |name: &str| trajectory.get(name).filter(|value| !value.is_null());
         let point = |point: &Value| WrittenPoint {
             x: point.get("x").and_then(Value::as_f64),
             y: point.get("y").and_then(Value::as_f64),
             weight: point.get("weight").map(float),
         };
         Self {
-            degree: trajectory.get("degree").filter(|degree| !degree.is_null()).map(float),
-            points: list("controlPoints").map(|points| points.iter().map(point).collect()),
-            knots: list("knotVector").and_then(|knots| knots.iter().map(Value::as_f64).collect()),
+            degree: there("degree").map(float),
+            points: there("controlPoints")
+                .and_then(Value::as_array)
+                .map(|points| points.iter().map(point).collect()),
+            knots: there("knotVector").map(|knots| match knots.as_array() {
+                Some(knots) => knots.iter().map(float).collect(),
+                None => vec![f64::NAN],
+            }),
         }
     }
 }
@@ -145,6 +161,15 @@ fn read_points(points: Option<Vec<WrittenPoint>>, flaws: &mut Vec<Flaw>) -> Vec<
     points
 }
 
+/// Knots at even distances from 0 to 1, the first and the last one as often as a curve needs that joins its ends.
+fn even_knots(degree: usize, points: usize) -> Vec<f64> {
+    let spans = points.saturating_sub(degree).clamp(1, MOST_POINTS);
+    #[expect(clippy::cast_precision_loss, reason = "a few thousand at most")]
+    let inner = (1..spans).map(|knot| knot as f64 / spans as f64);
+    let end = |knot: f64| std::iter::repeat_n(knot, degree.min(MOST_POINTS) + 1);
+    end(0.0).chain(inner).chain(end(1.0)).collect()
+}
+
 impl Curve {
     /// Reads a trajectory: what is wrong with it, and the curve if it can be calculated with all the same.
     #[must_use]
@@ -153,13 +178,16 @@ impl Curve {
         let mut flaws = Vec::new();
         let degree = read_degree(degree, &mut flaws);
         let points = read_points(points, &mut flaws);
-        if knots.is_none() {
+        if knots.iter().flatten().any(|knot| knot.is_nan()) {
             flaws.push(Flaw::Member("knotVector is not a list of numbers".to_owned()));
         }
-        let readable = flaws.iter().all(|flaw| *flaw == Flaw::DegreeMissing);
-        let Some(knots) = knots.filter(|_| readable) else {
+        if knots.is_none() {
+            flaws.push(Flaw::KnotsMissing);
+        }
+        if !flaws.iter().all(Flaw::has_default) {
             return (None, flaws);
-        };
+        }
+        let knots = knots.unwrap_or_else(|| even_knots(degree, points.len()));
         let wanted = points.len() + degree + 1;
         if knots.len() != wanted {
             flaws.push(Flaw::KnotCount {
@@ -177,7 +205,7 @@ impl Curve {
             flaws.push(Flaw::KnotOrder(at + 1));
         }
         let curve = Self { degree, knots, points };
-        let sound = flaws.iter().all(|flaw| *flaw == Flaw::DegreeMissing) && curve.is_calculable();
+        let sound = flaws.iter().all(Flaw::has_default) && curve.is_calculable();
         (sound.then_some(curve), flaws)
     }
 
@@ -439,6 +467,9 @@ mod tests {
         let (curve, flaws) = broken(json!({ "degree": null, "knotVector": [0, 0, 0.5, 1, 1] }));
         assert!(curve.is_some());
         assert_eq!(flaws, [Flaw::DegreeMissing]);
+        let (curve, flaws) = broken(json!({ "knotVector": null }));
+        assert_eq!((curve, flaws), (Curve::read(&quarter()).0, vec![Flaw::KnotsMissing]));
+        assert_eq!(even_knots(1, 4), [0.0, 0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0, 1.0]);
     }
 
     #[test]

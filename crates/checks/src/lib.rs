@@ -173,6 +173,7 @@ pub static REGISTRY: &[Check] = &[
     zones::DIRECTED,
     zones::ZONE_SETS,
     zones::ZONE_ACTIONS,
+    zones::ACTIONS_LISTED,
     motion_signs::TURN_SIGN,
     motion::MODE_SPEED,
     commands::NODES_AND_EDGES,

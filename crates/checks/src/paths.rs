@@ -137,7 +137,7 @@ impl Paths {
         for flaw in flaws {
             let text = format!("the trajectory of plannedPath: {flaw}");
             match flaw {
-                Flaw::DegreeMissing | Flaw::KnotOrder(_) => {}
+                Flaw::DegreeMissing | Flaw::KnotsMissing | Flaw::KnotOrder(_) => {}
                 _ => self.complain("flaw", broken("PATH-03", seq, text), findings),
             }
         }

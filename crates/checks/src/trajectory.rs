@@ -69,6 +69,11 @@ fn reported(state: &StateView) -> impl Iterator<Item = (u64, &EdgeState)> {
     reported.filter_map(|edge| Some((edge.sequence_id.whole()?, edge)))
 }
 
+/// Whether a flaw is one in this version: a member that is missing is none where the version says what is meant then.
+pub(crate) fn counts(flaw: &Flaw, context: &CheckContext<'_>) -> bool {
+    !(flaw.has_default() && context.pack.has("trajectoryDefaults"))
+}
+
 #[derive(Default)]
 struct Shape {
     /// What was complained about: one complaint per kind and edge is enough.
@@ -76,21 +81,27 @@ struct Shape {
 }
 
 impl Running for Shape {
-    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
         let Some(state) = record.state() else {
             return false;
         };
         let mut judged = false;
         for (sequence, edge) in reported(state) {
             judged = true;
-            for flaw in curve(&edge.trajectory).map(|(_, flaws)| flaws).unwrap_or_default() {
+            let flaws = curve(&edge.trajectory).map(|(_, flaws)| flaws).unwrap_or_default();
+            for flaw in flaws.into_iter().filter(|flaw| counts(flaw, context)) {
                 let key = (state.order_id.or_empty().to_owned(), sequence, flaw.to_string());
                 if self.said.len() >= EDGES || !self.said.insert(key) {
                     continue;
                 }
                 let message = format!("the trajectory of edge {sequence}: {flaw}");
                 findings.push(match flaw {
-                    Flaw::Member(_) => broken("ORD-MSG-28", record.seq(), message),
+                    Flaw::Member(_) | Flaw::KnotsMissing => broken("ORD-MSG-28", record.seq(), message),
                     Flaw::DegreeMissing => remark("ORD-MSG-28", record.seq(), message),
                     Flaw::KnotCount { .. } | Flaw::KnotRange { .. } => broken("ORD-MSG-29", record.seq(), message),
                     Flaw::KnotOrder(_) => remark("ORD-MSG-29", record.seq(), message),

@@ -164,10 +164,10 @@ fn a_stimulus_with_words_to_choose_from_becomes_one_for_every_mixture() {
         .map(|(name, one)| (name.as_str(), one.hears.as_str()))
         .collect();
     let mixtures = [
-        ("one.x-u", "x u"),
-        ("one.x-v", "x v"),
-        ("one.y-u", "y u"),
-        ("one.y-v", "y v"),
+        ("one.x-u", "x u\n"),
+        ("one.x-v", "x v\n"),
+        ("one.y-u", "y u\n"),
+        ("one.y-v", "y v\n"),
         ("two", ""),
     ];
     assert_eq!(heard, mixtures);
@@ -326,7 +326,7 @@ fn found(pack: &Pack, role: Role, faults: &[&str], seed: u64, conversations: usi
     for test in &finished.result.tests {
         assert!(test.journal.is_some(), "{} never begins", test.id);
         let well = test.came_to_its_end() || !faults.is_empty();
-        assert!(well, "{}: {:?}", test.id, test.reason);
+        assert!(well, "{}, {role}, {}: {:?}", pack.id, test.id, test.reason);
     }
     findings(&finished.result, &drawn)
 }

@@ -37,6 +37,8 @@ pub struct MonitorJudge {
     monitor: Arc<Monitor>,
     rule: Watching,
     judged: u64,
+    /// The requirements it is bound to that this version has.
+    owed: Vec<String>,
     /// What requirements are about, and has not come by yet.
     unseen: Vec<Awaited>,
     findings: Vec<MonitorFinding>,
@@ -115,11 +117,10 @@ impl MonitorJudge {
         tap: bool,
         known: &mut Knowledge,
     ) -> Option<Self> {
-        let wanted = monitor
-            .checks
-            .iter()
-            .any(|binding| mood(&ground.catalogue, &ground.pack, binding.requirement.as_str()).is_some());
-        if !monitor.spec.contains(ground.pack.version) || !wanted {
+        let bound = monitor.checks.iter().map(|binding| binding.requirement.as_str());
+        let owed = bound.filter(|id| mood(&ground.catalogue, &ground.pack, id).is_some());
+        let owed: Vec<String> = owed.map(str::to_owned).collect();
+        if !monitor.spec.contains(ground.pack.version) || owed.is_empty() {
             return None;
         }
         let mut open = None;
@@ -142,6 +143,7 @@ impl MonitorJudge {
         });
         Some(Self {
             unseen: about.collect(),
+            owed,
             open,
             monitor: Arc::clone(monitor),
             rule,
@@ -287,14 +289,13 @@ impl MonitorJudge {
             .retain(|awaited| awaited.topic != subject || !awaited.pattern.matches(&message, None));
     }
 
-    /// The requirements it is bound to and had something to judge of.
+    /// The requirements of this version that it is bound to and had something to judge of.
     pub(super) fn judged(&self) -> Vec<String> {
         if self.judged == 0 {
             return Vec::new();
         }
-        let bound = self.monitor.checks.iter().map(|binding| binding.requirement.as_str());
-        let seen = bound.filter(|id| !self.unseen.iter().any(|awaited| awaited.requirement == *id));
-        seen.map(str::to_owned).collect()
+        let is_seen = |id: &&String| !self.unseen.iter().any(|awaited| awaited.requirement == **id);
+        self.owed.iter().filter(is_seen).cloned().collect()
     }
 
     /// Takes what was found since it was taken last.

@@ -63,6 +63,9 @@ fn order_over(layout: &Layout, way: &[Edge], mut fresh: impl FnMut() -> String) 
 /// How often a device is restarted that floods the harness.
 const MOST_FLOODS: u32 = 3;
 
+/// So many instant actions that have ended are a long list.
+const LONG_LIST: usize = 40;
+
 /// How often in a row the whole ladder is tried before only a moment is given.
 const WHOLE_LADDERS: u32 = 3;
 
@@ -166,6 +169,27 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             self.ladders = 0;
         }
         Ok(left)
+    }
+
+    /// Has a long list of instant actions emptied, as a fleet control does (IACT-STATE-07): each state would be longer than the
+    /// one before, until the vehicle has no room for the next action.
+    pub(super) async fn empty_list(&mut self) -> Result<(), EngineError> {
+        let ended = |recorder: &tck_engine::Recorder| {
+            let state = recorder.judge().state();
+            let list = state.iter().flat_map(|state| state.instant_action_states.iter());
+            list.filter(|action| action.is_over()).count()
+        };
+        if !self.empties_lists || ended(&self.engine.recorder) < LONG_LIST || self.engine.interrupted() {
+            return Ok(());
+        }
+        let text = "the list of instant actions has become long: clearInstantActions".to_owned();
+        self.engine.note(Event::Note { text })?;
+        self.instant_action("clearInstantActions", json!([])).await?;
+        let until = self.engine.link.now().moment + self.time("react");
+        let is_short = |recorder: &tck_engine::Recorder| ended(recorder) < LONG_LIST;
+        // A vehicle that does not do it is not asked again.
+        self.empties_lists = self.engine.watch(until, is_short).await?;
+        Ok(())
     }
 
     /// Has the hook with this effect done, with the value of its parameter, if it takes one. `false` without such a hook.

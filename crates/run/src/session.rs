@@ -207,6 +207,8 @@ pub(super) struct Session<'a, L, O> {
     pub(super) home: Home,
     /// How often in a row the way back to rest was tried in vain.
     pub(super) ladders: u32,
+    /// Whether the vehicle empties its list of instant actions when it is told to.
+    pub(super) empties_lists: bool,
     /// The id of the last cancelOrder on that way.
     pub(super) cancelled: Option<String>,
     /// The vehicle was found to refuse every order, until it was restarted.
@@ -243,6 +245,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             halted: None,
             home: Home::default(),
             ladders: 0,
+            empties_lists: true,
             cancelled: None,
             refuses: false,
             unhelped: 0,
@@ -564,6 +567,7 @@ impl<'a, L: Link, O: Operator> Session<'a, L, O> {
             self.bring_to_rest().await?
         };
         if left.is_empty() {
+            self.empty_list().await?;
             self.still_takes_orders().await?;
         }
         if !left.iter().any(Obstacle::halts) {

@@ -11,6 +11,12 @@ use tck_journal::Reason;
 use tck_view::FactsheetView;
 use tck_world::outline::radius;
 
+/// What the nodes, the edges and the places of a course are called in the words of a test.
+const NODES: &str = "nodes";
+const EDGES: &str = "edges";
+const X: &str = "x";
+const Y: &str = "y";
+
 /// A zone reaches so far beyond its node or its edge, in metres, where there is room.
 const REACH: f64 = 0.5;
 
@@ -31,8 +37,8 @@ fn round(number: f64) -> f64 {
 }
 
 fn place(course: &Value, name: &str) -> Option<Point> {
-    let node = course.get("nodes")?.get(name)?;
-    Some(Point::new(node.get("x")?.as_f64()?, node.get("y")?.as_f64()?))
+    let node = course.get(NODES)?.get(name)?;
+    Some(Point::new(node.get(X)?.as_f64()?, node.get(Y)?.as_f64()?))
 }
 
 /// The corners about a node, or about the way between two, counter-clockwise.
@@ -67,7 +73,7 @@ fn corners(from: Point, to: Point, reach: f64) -> Vec<Point> {
 fn area(course: &Value, name: &str, size: f64) -> Option<Vec<Point>> {
     let (from, to) = name.split_once('-').unwrap_or((name, name));
     let (begin, end) = (place(course, from)?, place(course, to)?);
-    let nodes = course.get("nodes")?.as_object()?;
+    let nodes = course.get(NODES)?.as_object()?;
     let others = nodes.keys().filter(|other| *other != from && *other != to);
     let others: Vec<Point> = others
         .filter_map(|other| place(course, other))
@@ -102,7 +108,7 @@ pub(super) fn put(
                 format!("the nodes of the course are too near to each other for a zone and a vehicle of {size:.1} m");
             return Err(Reason::observed(why));
         };
-        let group = if name.contains('-') { "edges" } else { "nodes" };
+        let group = if name.contains('-') { EDGES } else { NODES };
         let corners = corners
             .iter()
             .map(|corner| json!({ "x": round(corner.x), "y": round(corner.y) }));

@@ -365,7 +365,7 @@ impl ReferenceAgv {
         self.time.quiet = self.time.quiet.max(latency * 2);
         // Long enough for what a test does meanwhile.
         let seconds = 0.5 + 3.0 * (self.config.answers_after + self.config.min_state_interval).as_secs_f64();
-        for name in ["long-action", "uninterruptible-action"] {
+        for name in ["long-action", "uninterruptible-action", "long-zone-action"] {
             if let Some(action) = Arc::make_mut(&mut self.actions).0.get_mut(name) {
                 action.parameters.insert("duration".to_owned(), json!(seconds));
             }

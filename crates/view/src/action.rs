@@ -33,11 +33,16 @@ view! {
 /// The value of a parameter that is not there.
 static NO_VALUE: Member<Json> = Member::Absent;
 
+/// Whether the vehicle gives its order up for an action of this type.
+pub(crate) fn clears_order(action_type: Option<&str>) -> bool {
+    matches!(action_type, Some("cancelOrder" | "startHibernation"))
+}
+
 impl ActionView {
     /// Whether the vehicle gives its order up for it.
     #[must_use]
     pub fn clears_order(&self) -> bool {
-        matches!(self.action_type.text(), Some("cancelOrder" | "startHibernation"))
+        clears_order(self.action_type.text())
     }
 
     /// The value of the first parameter with this key: absent where there is none, or where it has no value.

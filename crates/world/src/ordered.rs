@@ -81,6 +81,7 @@ fn read(trajectory: &Trajectory) -> (Option<Curve>, Vec<Flaw>) {
     Curve::read(Written {
         degree: written(&trajectory.degree).filter(|_| !trajectory.degree.is_null()),
         points: points.map(|points| points.iter().map(point).collect()),
-        knots: trajectory.knot_vector.floats(),
+        knots: (!trajectory.knot_vector.is_absent() && !trajectory.knot_vector.is_null())
+            .then(|| trajectory.knot_vector.floats().unwrap_or_else(|| vec![f64::NAN])),
     })
 }

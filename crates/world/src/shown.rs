@@ -8,6 +8,8 @@ use tck_view::{ActionState, ErrorView, Print, StateView};
 
 /// How many FATAL errors are kept in mind.
 const ERRORS: usize = 16;
+/// How many actions of a state are looked at.
+const ACTIONS: usize = 256;
 
 /// The order whose ids the states show. Which order had to be accepted is left to the tests.
 #[derive(Debug, Default)]
@@ -24,6 +26,8 @@ pub struct ShownOrder {
     fatal: Vec<Print>,
     /// Those among them with which the vehicle has taken the present order over all the same: they do not hold it.
     borne: Vec<Print>,
+    /// Ids of actions in the last state for which a vehicle gives its order up; `None` before the first state.
+    clearing: Option<Vec<String>>,
     /// The last record that can be held against its order.
     held: Option<u64>,
 }
@@ -61,6 +65,29 @@ impl ShownOrder {
 }
 
 impl ShownOrder {
+    /// Whether the state tells of an action that clears the order and was in no state before: a recording may hold it before the
+    /// order, or not at all. What is over where another order is shown, with nodes left, was for the one before; so it is in the
+    /// first state of all.
+    fn clears(&mut self, state: &StateView, is_next: bool) -> bool {
+        let listed = state.all_action_states().take(ACTIONS);
+        let listed = listed.filter(|action| action.clears_order() && !action.is_failed());
+        let before = self.clearing.take();
+        let has_nodes = state.node_states.iter().next().is_some();
+        let mut now = Vec::new();
+        let mut clears = false;
+        for action in listed {
+            let id = action.action_id.or_empty();
+            let known = before
+                .as_ref()
+                .is_some_and(|known| known.iter().any(|known| known == id));
+            let of_another = is_next && has_nodes && action.is_over();
+            clears |= !known && !of_another;
+            now.push(id.to_owned());
+        }
+        self.clearing = Some(now);
+        clears
+    }
+
     /// Learns from the next record.
     pub(crate) fn learn(&mut self, record: &Observation<'_>) {
         let moved = record.instant_actions_to_vehicle().is_some_and(|message| {
@@ -74,7 +101,9 @@ impl ShownOrder {
         let (Some(order), Some(last)) = (state.order_id.text(), last_node(state)) else {
             return;
         };
-        if self.order.as_deref() != Some(order) {
+        let is_next = self.order.as_deref() != Some(order);
+        let clears = self.clears(state, is_next);
+        if is_next {
             self.carried = self.last.take();
             self.order = Some(order.to_owned());
             self.turn += 1;
@@ -87,7 +116,7 @@ impl ShownOrder {
             self.carried = None;
         }
         self.last = Some(last);
-        if may_abandon_beside(state, &self.borne) {
+        if clears || may_abandon_beside(state, &self.borne) {
             self.abandoned.clone_from(&self.order);
         }
         if self.abandoned.is_none() {

@@ -2,6 +2,7 @@
 
 use super::{Command, Each, Found, allowed_deviation, edges_in_sequence, nodes_in_sequence, place_of};
 use crate::finding::quote;
+use crate::trajectory::counts;
 use tck_base::nurbs::{Curve, Flaw};
 use tck_check::{Check, CheckContext};
 use tck_view::{Edge, Node};
@@ -38,7 +39,7 @@ pub(crate) const ENDS: Check = Check {
 /// How far the end of a curve may be from its node, in metres.
 const END: f64 = 0.5;
 
-fn shape(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
+fn shape(command: Command<'_>, context: &CheckContext<'_>, found: &mut Found<'_>) -> bool {
     let Some(order) = command.order() else { return false };
     let mut judged = false;
     for edge in edges_in_sequence(order) {
@@ -46,10 +47,10 @@ fn shape(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<'_>) -> b
             continue;
         };
         judged = true;
-        for flaw in flaws {
+        for flaw in flaws.into_iter().filter(|flaw| counts(flaw, context)) {
             let text = format!("the trajectory of edge {}: {flaw}", quote(edge.edge_id.or_empty()));
             match flaw {
-                Flaw::Member(_) => found.broken("ORD-MSG-28", text),
+                Flaw::Member(_) | Flaw::KnotsMissing => found.broken("ORD-MSG-28", text),
                 Flaw::DegreeMissing => found.remark("ORD-MSG-28", text),
                 Flaw::KnotCount { .. } | Flaw::KnotRange { .. } => found.broken("ORD-MSG-29", text),
                 Flaw::KnotOrder(_) => found.remark("ORD-MSG-29", text),

@@ -12,10 +12,10 @@ use tck_world::{Fact, Listen, Observation, Topic, apart};
 /// `zones/directed`.
 pub(crate) const DIRECTED: Check = Check {
     name: "zones/directed",
-    decides: &["ZONE-21", "ZONE-22", "ZONE-23"],
+    decides: &["ZONE-21", "ZONE-23"],
     doc: "Between two places inside a DIRECTED zone a vehicle travels in its direction: RESTRICTED, never opposite to it; \
           STRICT, along it. In a BIDIRECTED zone that is RESTRICTED it travels along its direction or the opposite one. What is less \
-          than clearly wrong is a warning, and so is travel against a SOFT direction. Ways shorter than 0.3 m, ways on an edge \
+          than clearly wrong is a warning; whether there was another way than against a SOFT direction is not known. Ways shorter than 0.3 m, ways on an edge \
           with a trajectory, and what is near the border, are not judged.",
     arguments: &[],
     listens: &[
@@ -63,7 +63,6 @@ fn wrong(zone: &KnownZone, heading: f64) -> Option<Wrong> {
             "RESTRICTED" if off > 100.0 => Some(Wrong::Slightly("ZONE-21")),
             "STRICT" if off > 45.0 => Some(Wrong::Clearly("ZONE-21")),
             "STRICT" if off > 25.0 => Some(Wrong::Slightly("ZONE-21")),
-            "SOFT" if off > 100.0 => Some(Wrong::Slightly("ZONE-22")),
             _ => None,
         };
     }
@@ -73,7 +72,6 @@ fn wrong(zone: &KnownZone, heading: f64) -> Option<Wrong> {
         return match limitation {
             "RESTRICTED" if off > 45.0 => Some(Wrong::Clearly("ZONE-23")),
             "RESTRICTED" if off > 25.0 => Some(Wrong::Slightly("ZONE-23")),
-            "SOFT" if off > 45.0 => Some(Wrong::Slightly("ZONE-22")),
             _ => None,
         };
     }

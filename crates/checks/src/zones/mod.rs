@@ -4,6 +4,7 @@ mod actions;
 mod blocked;
 mod directed;
 mod line_guided;
+mod listed;
 mod sets;
 mod speed;
 #[cfg(test)]
@@ -13,6 +14,7 @@ pub(super) use actions::ZONE_ACTIONS;
 pub(super) use blocked::BLOCKED;
 pub(super) use directed::DIRECTED;
 pub(super) use line_guided::LINE_GUIDED;
+pub(super) use listed::ACTIONS_LISTED;
 pub(super) use sets::ZONE_SETS;
 pub(super) use speed::SPEED;
 

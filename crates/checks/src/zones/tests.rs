@@ -132,7 +132,10 @@ fn travel_against_a_direction_is_found_and_travel_along_it_is_not() {
     assert_eq!(driven(&directed(3.1, "RESTRICTED")), ["ZONE-21"]);
     assert_eq!(driven(&directed(2.2, "RESTRICTED")), ["ZONE-21 warning"]);
     assert_eq!(driven(&directed(1.0, "STRICT")), ["ZONE-21"]);
-    assert_eq!(driven(&directed(3.1, "SOFT")), ["ZONE-22 warning"]);
+    assert!(
+        driven(&directed(3.1, "SOFT")).is_empty(),
+        "nobody knows whether there was another way"
+    );
     let both = zone(
         "BIDIRECTED",
         &json!({ "direction": 3.1, "bidirectedLimitation": "RESTRICTED" }),
@@ -177,12 +180,15 @@ fn zone_sets_that_change_as_they_are_told_are_not() {
         let set = json!({ "zoneSet": { "mapId": "hall", "zoneSetId": "a", "zones": [] } });
         match index {
             1 => trace.sent("zoneSet", &set),
-            2 => trace.instant("enableZoneSet", "e", &json!({ "zoneSetId": "a" })),
-            3 => trace.instant("deleteZoneSet", "d", &json!({ "zoneSetId": "a" })),
+            2 => trace.instant("enableZoneSet", "e", &json!([{ "key": "zoneSetId", "value": "a" }])),
+            3 => trace.instant("deleteZoneSet", "d", &json!([{ "key": "zoneSetId", "value": "a" }])),
             _ => trace,
         };
     };
-    assert!(sets(&[json!([]), a("DISABLED"), a("ENABLED"), json!([])], sends).is_empty());
+    assert_eq!(
+        sets(&[json!([]), a("DISABLED"), a("ENABLED"), json!([])], sends),
+        Vec::<String>::new()
+    );
     assert_eq!(sets(&[json!([]), a("ENABLED")], sends), ["ZSET-07"]);
 }
 

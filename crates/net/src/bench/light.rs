@@ -28,7 +28,7 @@ use super::stream::Stream;
 use tck_base::device::Publication;
 
 /// How long a broker may take to accept a connection, with the connection itself where it is TCP alone.
-const ENTRY_LIMIT: Duration = Duration::from_secs(15);
+const ENTRY_LIMIT: Duration = Duration::from_secs(5);
 /// How long TLS or a WebSocket may take besides.
 const SECURING_LIMIT: Duration = Duration::from_secs(10);
 /// How many bytes are read at once, on the stack.

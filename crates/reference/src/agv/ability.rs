@@ -9,6 +9,7 @@ use super::actions::Origin;
 use super::objections::{Asked, Lack, Objection};
 use super::order_message::{Edge, Node, Order};
 use super::order_state::Place;
+use super::read::Defect;
 use super::rejection::{Detail, Refusal, Rule};
 use super::{Agv, motion};
 
@@ -51,6 +52,11 @@ impl Agv {
         }
         if let Some(defect) = order.defects.first().filter(|_| self.config.trajectories) {
             return Err(defect.clone().into());
+        }
+        let needs_knots = self.config.trajectories && !self.config.has("trajectoryDefaults");
+        let mut edges = order.edges.iter().filter(|_| needs_knots);
+        if let Some(edge) = edges.find(|edge| edge.trajectory.as_ref().is_some_and(|curve| curve.lacks_knots)) {
+            return Err(Defect::no_curve(&format!("{}.trajectory", edge.path)).into());
         }
         for (index, node) in order.nodes.iter().enumerate() {
             let Some(place) = self.place(node) else {

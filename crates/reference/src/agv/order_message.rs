@@ -194,22 +194,22 @@ impl Corridor {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Trajectory {
     pub(crate) sent: Value,
+    /// Whether it has no knotVector, for which there is a usual one in some versions.
+    pub(crate) lacks_knots: bool,
     pub(crate) path: Path,
 }
 
 impl Trajectory {
     fn read(value: &Value, path: &str) -> Result<Self, Defect> {
         let (curve, flaws) = Curve::read(value);
-        let wrong = flaws.iter().any(|flaw| *flaw != Flaw::DegreeMissing);
+        let wrong = !flaws.iter().all(Flaw::has_default);
         match curve.filter(|_| !wrong) {
             Some(curve) => Ok(Self {
                 sent: value.clone(),
+                lacks_knots: flaws.contains(&Flaw::KnotsMissing),
                 path: curve.path(),
             }),
-            None => Err(Defect {
-                path: path.to_owned(),
-                reason: "is no curve",
-            }),
+            None => Err(Defect::no_curve(path)),
         }
     }
 }

@@ -17,6 +17,16 @@ pub(crate) struct Defect {
     pub(crate) reason: &'static str,
 }
 
+impl Defect {
+    /// Of a trajectory that cannot be driven along.
+    pub(crate) fn no_curve(path: &str) -> Self {
+        Self {
+            path: path.to_owned(),
+            reason: "is no curve",
+        }
+    }
+}
+
 /// The fields of one JSON object.
 #[derive(Clone)]
 pub(crate) struct Fields<'a> {

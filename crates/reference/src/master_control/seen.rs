@@ -30,6 +30,17 @@ fn whole<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
     Ok(number as u32)
 }
 
+/// What can be read of a list. In versions that do not have it, a manufacturer may mean something else by its name.
+fn readable<'de, D: Deserializer<'de>, T: serde::de::DeserializeOwned>(deserializer: D) -> Result<Vec<T>, D::Error> {
+    let value = Value::deserialize(deserializer)?;
+    let list = value.as_array().map(Vec::as_slice).unwrap_or_default();
+    Ok(list
+        .iter()
+        .take(1000)
+        .filter_map(|entry| T::deserialize(entry).ok())
+        .collect())
+}
+
 /// The header, for whom a message is from.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase")]
@@ -214,9 +225,9 @@ pub(crate) struct State {
     #[serde(default)]
     pub(crate) new_base_request: Option<bool>,
     pub(crate) action_states: Vec<ActionState>,
-    #[serde(default)]
+    #[serde(default, deserialize_with = "readable")]
     pub(crate) instant_action_states: Vec<ActionState>,
-    #[serde(default)]
+    #[serde(default, deserialize_with = "readable")]
     pub(crate) zone_action_states: Vec<ActionState>,
     #[serde(default)]
     pub(crate) battery_state: Battery,
@@ -231,10 +242,10 @@ pub(crate) struct State {
     pub(crate) maps: Option<Vec<MapSeen>>,
     #[serde(default)]
     pub(crate) zone_sets: Option<Vec<ZoneSetSeen>>,
-    #[serde(default)]
-    zone_requests: Option<Vec<RequestSeen>>,
-    #[serde(default)]
-    edge_requests: Option<Vec<RequestSeen>>,
+    #[serde(default, deserialize_with = "readable")]
+    zone_requests: Vec<RequestSeen>,
+    #[serde(default, deserialize_with = "readable")]
+    edge_requests: Vec<RequestSeen>,
 }
 
 impl State {
@@ -246,8 +257,7 @@ impl State {
 
     /// Everything the vehicle asks for.
     pub(crate) fn requests(&self) -> impl Iterator<Item = &RequestSeen> {
-        let zones = self.zone_requests.iter().flatten();
-        zones.chain(self.edge_requests.iter().flatten())
+        self.zone_requests.iter().chain(&self.edge_requests)
     }
 
     /// Whether the vehicle reports an error of this name, however it is written.

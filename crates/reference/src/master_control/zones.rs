@@ -168,15 +168,12 @@ impl Site {
 
     /// Sees to it that a vehicle has the sets it shall have, and that they are enabled (ZSET-08).
     pub(super) fn watch_zones(&mut self, vehicle: &mut Vehicle) {
-        if vehicle.zone_sets.is_empty() {
-            return;
-        }
         if !self.takes_zones(vehicle) {
             // It has another factsheet than before, and what waits is nothing to it.
             vehicle.instants.retain(|instant| !ACTIONS.contains(&instant.kind()));
             return;
         }
-        if !self.commandable(vehicle) {
+        if vehicle.zone_sets.is_empty() || !self.commandable(vehicle) {
             return;
         }
         for mut set in std::mem::take(&mut vehicle.zone_sets) {

@@ -126,6 +126,19 @@ pub(super) fn monitor(
         problems,
     };
     linter.header(&monitor.spec, &monitor.needs, places);
+    for (_, at) in monitor
+        .needs
+        .iter()
+        .zip(&places.needs)
+        .filter(|(need, _)| **need != Need::Tap)
+    {
+        linter.problems.at(
+            "monitor-need",
+            at,
+            "a monitor can only need the vantage `tap`",
+            "what the device offers is for the check of the monitor to find out",
+        );
+    }
     let packs = linter.packs.clone();
     if packs.is_empty() {
         return;

@@ -57,6 +57,12 @@ impl ActionState {
         matches!(self.action_status.text(), Some("FINISHED" | "FAILED"))
     }
 
+    /// Whether the vehicle gives its order up for it.
+    #[must_use]
+    pub fn clears_order(&self) -> bool {
+        crate::action::clears_order(self.action_type.text())
+    }
+
     /// Whether it has failed.
     #[must_use]
     pub fn is_failed(&self) -> bool {

@@ -28,7 +28,7 @@ fn mistakes_in_updates_are_found() {
     );
     assert_eq!(
         updated(|order| order["orderId"] = json!("o2")),
-        ["ORD-CANCEL-01", "ORD-UPD-04"]
+        ["ORD-CANCEL-01", "ORD-UPD-04", "ORD-UPD-14"]
     );
     assert_eq!(
         updated(|second| *second = order("o1", 1, 0, 4, 5)),

@@ -7,6 +7,10 @@ records! {
         => error(|agv, error, m| if error.error_type == agv.config.errors.other_order_active { m.set("errorLevel", "URGENT") });
     fault "start-without-its-order" ["ERR-10"] "It names nothing when an order begins too far away." because "By the ruling of ERR-10 missing references are a warning."
         => error(|agv, error, m| if error.error_type == agv.config.errors.start_out_of_range { m.set("errorReferences", json!([])) });
+    fault "unknown-map-by-another-name" ["ORD-REJ-25"] "It has a name of its own for an order on a map that it does not have." because "Another name is a warning by the ruling of ORD-REJ-25."
+        => error(|agv, error, m| if error.error_type == agv.config.errors.unknown_map { m.set("errorType", "mapIsNotHere") });
+    fault "unsupported-parameter-as-warning" ["OPT-02", "ERR-08"] "It reports a parameter that it has no use for as WARNING."
+        => error(|agv, error, m| if error.error_type == agv.config.errors.unsupported { m.set("errorLevel", "WARNING") });
     fault "takes-orders-with-a-fatal-error" ["ERR-04"] "It takes an order over while a FATAL error keeps it from driving."
         => forbidding(|_, what| matches!(what, Permission::RefuseHelpless));
     fault "refused-instant-fades" ["IACT-10", "ERR-09"] "The error of an instant action that it cannot perform is gone after a second."

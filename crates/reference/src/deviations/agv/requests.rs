@@ -37,7 +37,7 @@ records! {
         });
     fault "corridor-request-gone-early" ["CORR-16"] "It removes the request for a corridor as soon as it has left its trajectory."
         => wording(|request, _| request.way.is_none());
-    fault "corridor-request-left-behind" ["REQ-15", "CORR-16"] "It never removes a request for a corridor."
+    fault "corridor-request-left-behind" ["REQ-15", "CORR-16", "ORD-CLEAR-08"] "It never removes a request for a corridor."
         => letting(|_, what| matches!(what, Permission::KeepRequest));
     fault "corridor-of-horizon-asked" ["CORR-13"] "It asks for the corridor of an edge that is not released yet."
         => letting(|agv, what| matches!(what, Permission::Ask(edge) if agv.has_to_ask(edge)));

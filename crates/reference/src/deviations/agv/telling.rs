@@ -17,6 +17,8 @@ records! {
         => untold(|_, changes, _| changes.mode, Telling::Later);
     fault "maps-without-state" ["STATE-10"] "Does not send a state when its maps change."
         => untold(|_, changes, _| changes.maps, Telling::Later);
+    fault "zone-sets-without-state" ["STATE-23"] "Does not send a state when its zone sets change."
+        => untold(|_, changes, _| changes.zone_sets, Telling::Later);
     fault "node-without-state" ["STATE-06"] "Does not send a state when it drives over a node."
         => untold(|_, changes, _| changes.node && !changes.order, Telling::Never);
     fault "driving-without-state" ["STATE-08"] "Does not send a state when it starts or stops."

@@ -1,6 +1,5 @@
 //! Deviations of what is done with zone sets (section 6.4.2).
 
-use crate::agv::report::{Changes, Telling};
 use crate::agv::zone_sets::ZoneSet;
 
 use super::prelude::*;
@@ -53,10 +52,21 @@ records! {
         => fails_unseen(Effect::EnableZoneSet);
     fault "enable-unknown-zone-set-disables" ["ZSET-11"] "Disables its zone sets before it fails to enable one it does not have."
         => failed(Effect::EnableZoneSet, |agv, _| agv.zone_sets.all.iter_mut().for_each(|set| set.enabled = false));
+    fault "enable-zone-set-said-to-fail" ["ZSET-10"] "Enables a zone set, and reports enableZoneSet FAILED."
+        => after(Effect::EnableZoneSet, |_, action, outcome| match outcome {
+            Outcome::Done(_) => Outcome::Failed(Problem::zone_set(action, "nobody knows why")),
+            other => other,
+        });
     fault "enable-zone-set-twice-fails" ["ACT-11"] "Reports enableZoneSet FAILED when the zone set is enabled already."
         => instead(Effect::EnableZoneSet, |agv, action| {
             let enabled = agv.zone_sets.get(action.text("zoneSetId")).is_some_and(|set| set.enabled);
             enabled.then(|| Outcome::Failed(Problem::zone_set(action, "the zone set is enabled already")))
+        });
+    fault "enable-zone-set-twice-toggles" ["ACT-11"] "Disables a zone set that is to be enabled and is so already."
+        => instead(Effect::EnableZoneSet, |agv, action| {
+            let set = agv.zone_sets.all.iter_mut().find(|set| set.id == action.text("zoneSetId") && set.enabled)?;
+            set.enabled = false;
+            Some(Outcome::Done(None))
         });
     fault "duplicate-zone-set-taken" ["ZSET-13"] "Takes a zone set over although it has one of that id, and says nothing."
         => letting(|_, what| matches!(what, Permission::TakeZoneSetAgain));
@@ -78,13 +88,6 @@ records! {
         });
     fault "duplicate-zone-set-downloaded" ["ZSET-13"] "Reports downloadZoneSet FINISHED for a zone set it has, and leaves that as it is."
         => fails_unseen(Effect::DownloadZoneSet);
-    fault "duplicate-zone-set-brief" ["ZSET-13"] "Reports a zone set it has already in one state only." because "The ruling of ZSET-13 makes a single state a warning."
-        => raising(|agv, _, error| {
-            if error.error_type == agv.config.errors.duplicate_zone_set {
-                error.life = Life::Until(agv.moment() + brief(agv));
-            }
-            true
-        });
     fault "duplicate-zone-set-deleted" ["ZSET-13"] "Deletes the zone set it has when another one of its id comes."
         => raising(|agv, cause, error| {
             if matches!(cause, Cause::ZoneSet) && error.error_type == agv.config.errors.duplicate_zone_set {
@@ -103,13 +106,13 @@ records! {
         => state(|_, words| words.change("zoneSets", |sets| if let Value::Array(sets) = sets {
             sets.iter_mut().filter_map(Value::as_object_mut).for_each(|set| { set.remove("mapId"); });
         }));
-    fault "zone-set-change-not-told" ["STATE-23"] "Says that its zone sets have changed with the next state only."
-        => plain().tells(|_, _, changes, requested| {
-            let alone = Changes { zone_sets: true, actions: changes.actions, ..Changes::default() };
-            if changes.zone_sets && changes == alone && !requested { Telling::Never } else { Telling::Now }
-        });
     fault "deleted-zone-set-listed" ["ZSET-15"] "Reports deleteZoneSet FINISHED and keeps the zone set."
         => instead(Effect::DeleteZoneSet, |agv, action| known(agv, action).then_some(Outcome::Done(None)));
+    fault "delete-zone-set-said-to-fail" ["ZSET-15"] "Deletes a zone set, and reports deleteZoneSet FAILED."
+        => after(Effect::DeleteZoneSet, |_, action, outcome| match outcome {
+            Outcome::Done(_) => Outcome::Failed(Problem::zone_set(action, "nobody knows why")),
+            other => other,
+        });
     fault "delete-takes-all-zone-sets" ["ZSET-15", "ZSET-03"] "Deletes every zone set of a map when one is to be deleted."
         => instead(Effect::DeleteZoneSet, |agv, action| {
             let map = agv.zone_sets.get(action.text("zoneSetId"))?.map_id.clone();
@@ -182,7 +185,7 @@ records! {
             agv.zone_set_received(message.to_string().as_bytes());
             false
         });
-    fault "undeclared-zone-silent" ["ZSET-26"] "Takes a zone set over with a kind of zone that it does not declare, and says nothing." because "A recommendation."
+    fault "undeclared-zone-silent" ["ZSET-26"] "Takes a zone set over with a kind of zone that it does not declare, and says nothing." because "It breaks a recommendation only."
         => letting(|_, what| matches!(what, Permission::TakeZoneUnheeded));
     fault "unknown-zone-type-declared" ["ZONE-01"] "Declares a kind of zone that there is not."
         => factsheet(|_, words| words.change("typeSpecification", |kind| kind["supportedZones"] = json!(["BLOCKED", "SLOW"])));

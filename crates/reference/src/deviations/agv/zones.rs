@@ -1,7 +1,6 @@
 //! Deviations of what a vehicle does in zones (sections 6.4.1, 6.4.4 and 6.4.5).
 
 use crate::agv::hook_points::Passage;
-use crate::agv::report::{Changes, Telling};
 use crate::agv::zones::ZoneKind;
 
 use super::prelude::*;
@@ -15,6 +14,7 @@ records! {
     fault "blocked-zone-entered" ["ZONE-05", "ZONE-02", "ZINT-01"] "Drives into BLOCKED zones."
         => forbidding(|_, what| match what {
             Permission::StayOut(zone) => zone.kind == ZoneKind::Blocked,
+            Permission::StopInZone => true,
             _ => false,
         });
     fault "blocked-zones-unseen" ["ZONE-05", "ZONE-06", "ZONE-02", "ZINT-01"] "Takes no notice of BLOCKED zones."
@@ -123,27 +123,19 @@ records! {
         => action(|_, action, _| !action.of_zone() || !action.status.is_terminal());
     fault "clear-zone-actions-without-effect" ["ZACT-STATE-05"] "Reports clearZoneActions FINISHED and removes nothing."
         => instead(Effect::ClearZoneActions, |_, _| Some(Outcome::Done(None)));
-    fault "clear-zone-actions-takes-running" ["ZACT-STATE-05"] "Removes actions of zones that have not ended as well."
+    fault "clear-zone-actions-takes-running" ["ZACT-STATE-05"] "Removes actions of zones that have not ended as well." because "Such an action may have ended meanwhile."
         => succeeded(Effect::ClearZoneActions, |agv, _| agv.actions.retain(|action| !action.of_zone()));
     fault "clear-instant-actions-takes-those-of-zones" ["ZACT-STATE-04"] "On clearInstantActions it removes actions of zones, too."
         => succeeded(Effect::ClearInstantActions, |agv, _| agv.actions.retain(|action| !action.of_zone()));
-    fault "zone-action-change-not-told" ["STATE-09"] "Says how far actions of zones are with the next periodic state only."
-        => keep::<Vec<Status>>().tells(|before, agv, changes, requested| {
-            let now: Vec<Status> = agv.actions.iter().filter(|action| action.of_zone()).map(|action| action.status).collect();
-            let changed = *before != now;
-            *before = now;
-            let alone = Changes { actions: true, ..Changes::default() };
-            if changed && changes == alone && !requested { Telling::Never } else { Telling::Now }
-        });
     fault "zone-action-occupies" ["ORD-17"] "Counts as busy while an action of a zone runs."
         => letting(|agv, what| {
             let open = |action: &Action| action.of_zone() && !action.status.is_terminal();
             matches!(what, Permission::BeBusy) && agv.actions.iter().any(open)
         });
 
-    fault "directed-zones-ignored" ["ZONE-21", "ZONE-04"] "Takes no notice of DIRECTED zones."
+    fault "directed-zones-ignored" ["ZONE-21"] "Takes no notice of DIRECTED zones."
         => forbidding(|_, what| matches!(what, Permission::HeedZone(zone) if matches!(zone.kind, ZoneKind::Directed(..))));
-    fault "bidirected-zones-ignored" ["ZONE-23", "ZONE-04"] "Takes no notice of BIDIRECTED zones."
+    fault "bidirected-zones-ignored" ["ZONE-23"] "Takes no notice of BIDIRECTED zones."
         => forbidding(|_, what| matches!(what, Permission::HeedZone(zone) if matches!(zone.kind, ZoneKind::Bidirected(..))));
     fault "line-guided-zones-entered-freely" ["ZONE-08"] "Drives into LINE_GUIDED zones on edges without a trajectory."
         => forbidding(|_, what| matches!(what, Permission::StayOut(zone) if zone.kind == ZoneKind::LineGuided));
@@ -152,7 +144,7 @@ records! {
             Permission::StayOut(zone) => usual || matches!(zone.kind, ZoneKind::Directed(..) | ZoneKind::Bidirected(..)),
             _ => usual,
         });
-    fault "line-guided-zones-cut" ["ZONE-07", "ZINT-02"] "Does not follow trajectories in LINE_GUIDED zones."
+    fault "line-guided-zones-cut" ["ZONE-07"] "Does not follow trajectories in LINE_GUIDED zones."
         => plain().bends(|_, agv, _, path| {
             let zones = agv.zone_sets.all.iter().filter(|set| set.enabled).flat_map(|set| &set.zones);
             let guided = zones.into_iter().any(|zone| zone.kind == ZoneKind::LineGuided);
@@ -162,6 +154,14 @@ records! {
         => forbidding(|_, what| matches!(what, Permission::SeeConflict));
     fault "zone-action-conflict-silent" ["ZINT-03"] "Stops for actions of zones that conflict, and reports no error."
         => raising(|agv, _, error| error.error_type != agv.config.errors.zone_action_conflict);
+
+    fault "zone-action-conflict-unnamed" ["ZINT-03"] "Does not say which zone asks for what conflicts."
+        => raising(|agv, _, error| {
+            if error.error_type == agv.config.errors.zone_action_conflict {
+                error.references.clear();
+            }
+            true
+        });
 
     fault "unreachable-node-silent" ["ZERR-01"] "Stands before a zone that keeps it from its node, and says nothing."
         => raising(|agv, _, error| error.error_type != agv.config.errors.node_unreachable);
@@ -181,12 +181,20 @@ records! {
             let name = agv.config.errors.node_unreachable.clone();
             agv.errors.active.retain(|error| error.error_type != name);
         });
-    fault "unreachable-node-error-stays" ["ZERR-01"] "Keeps the error of a node out of reach when a new order is accepted."
-        => plain().happens(|_, agv, _| {
-            let name = agv.config.errors.node_unreachable.clone();
-            agv.errors.active.iter_mut().filter(|error| error.error_type == name).for_each(|error| error.life = Life::Always);
+    fault "unreachable-node-error-stays" ["ZERR-01"] "Keeps the error of a node out of reach for a while when a new order is accepted."
+        => keep::<Option<ActiveError>>().happens(|before, agv, event| match event {
+            Event::StateSent => {
+                let name = &agv.config.errors.node_unreachable;
+                let lasting = |error: &&ActiveError| error.error_type == *name && error.life == Life::UntilNewOrder;
+                *before = agv.errors.active.iter().find(lasting).cloned();
+            }
+            Event::Begun => if let Some(error) = before.take() {
+                let life = Life::Until(agv.moment() + Duration::from_secs(2));
+                agv.errors.raise(ActiveError { life, ..error });
+            },
+            _ => {}
         });
-    fault "unreachable-node-tried-again" ["ZERR-02"] "Drives on to a node that was out of reach as soon as the way is free."
+    fault "unreachable-node-tried-again" ["ZERR-02"] "Drives on to a node that was out of reach as soon as the way is free." because "A zone set that opens the way may count as an instruction."
         => letting(|_, what| matches!(what, Permission::TryAgain));
     fault "no-order-after-unreachable-node" ["ERR-07"] "Refuses every order once a node was out of reach, even when the order before was cancelled."
         => objecting(|agv, _, relation| {

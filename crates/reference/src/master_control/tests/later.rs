@@ -29,6 +29,13 @@ fn bench() -> Bench {
     }
     let mut bench = Bench::alone(MasterControl::new(config));
     bench.say("connection", &connection("ONLINE"));
+    bench.say(
+        "factsheet",
+        &json!({
+            "manufacturer": "Reference", "serialNumber": "agv-1",
+            "protocolFeatures": { "optionalParameters": [{ "parameter": "order.edges.fastest", "support": "SUPPORTED" }] },
+        }),
+    );
     bench
 }
 
