@@ -124,6 +124,7 @@ pub static REGISTRY: &[Check] = &[
     paths::SHARED,
     paths::PATHS,
     paths::OWN,
+    paths::ON_EDGES,
     state::battery::LEVELS,
     state::battery::PERCENT,
     state::loads::LOADS,

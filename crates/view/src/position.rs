@@ -54,12 +54,22 @@ pub enum Deviation {
 }
 
 impl Deviation {
-    /// The radius, where it is one.
+    /// How far off the vehicle may be in some direction, in metres: the radius, or the longer half axis.
     #[must_use]
-    pub const fn radius(&self) -> Option<f64> {
+    pub fn farthest(&self) -> Option<f64> {
+        self.half_axis(f64::max)
+    }
+
+    /// How far off the vehicle may be in every direction, in metres: the radius, or the shorter half axis.
+    #[must_use]
+    pub fn everywhere(&self) -> Option<f64> {
+        self.half_axis(f64::min)
+    }
+
+    fn half_axis(&self, of: fn(f64, f64) -> f64) -> Option<f64> {
         match self {
             Self::Radius(radius) => Some(radius.float()),
-            Self::Ellipse(_) => None,
+            Self::Ellipse(ellipse) => Some(of(ellipse.a.float()?, ellipse.b.float()?)),
         }
     }
 }

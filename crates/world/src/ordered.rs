@@ -42,7 +42,13 @@ pub fn place_of(node: &Node) -> Option<(f64, f64, &str)> {
 /// The radius in which a vehicle has reached a node.
 #[must_use]
 pub fn allowed_deviation(node: &Node) -> Option<f64> {
-    node.node_position.there()?.allowed_deviation_xy.there()?.radius()
+    node.node_position.there()?.allowed_deviation_xy.there()?.farthest()
+}
+
+/// allowedDeviationXY of a node in the direction in which it allows least, in metres; `None` where the node has none.
+#[must_use]
+pub fn least_deviation(node: &Node) -> Option<f64> {
+    node.node_position.there()?.allowed_deviation_xy.there()?.everywhere()
 }
 
 /// A short copy of a text; `None` when it is missing or no text.

@@ -109,7 +109,7 @@ impl Agv {
             let refusal = Refusal::new(Rule::OtherOrderActive, "the vehicle is not in an automatic mode");
             self.object(Objection::Mode, refusal.because(Detail::Mode))?;
         }
-        if self.config.has("fatalRefuses") && self.errors.need_help() && self.allows(Permission::RefuseHelpless, true) {
+        if self.config.has("fatalRefuses") && self.allows(Permission::RefuseHelpless, self.errors.need_help()) {
             let refusal = Refusal::new(Rule::OtherOrderActive, "the vehicle waits for somebody to help it");
             return Err(refusal.because(Detail::Mode));
         }

@@ -84,6 +84,13 @@ records! {
             }
             true
         });
+    fault "failed-retriable-keeps-running" ["RETRY-01"] "An action that may be tried again stays RUNNING when it has failed."
+        => action(|_, action, m| {
+            if action.request.retriable && matches!(action.status, Status::Retriable | Status::Failed) {
+                m.set("actionStatus", "RUNNING");
+            }
+            true
+        });
     fault "retriable-survives-cancel" ["ORD-CANCEL-27", "RETRY-06"] "An action that waits for a retry goes on waiting when its order is cancelled."
         => breaking(|_, action, usual| usual.filter(|_| action.status != Status::Retriable));
     fault "flags-without-state" ["STATE-18", "STATE-19"] "It sends no state of its own when paused or safetyState changes."

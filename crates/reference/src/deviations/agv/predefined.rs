@@ -13,6 +13,8 @@ records! {
         => error(|agv, error, m| if error.error_type == agv.config.errors.unsupported { m.set("errorLevel", "WARNING") });
     fault "takes-orders-with-a-fatal-error" ["ERR-04"] "It takes an order over while a FATAL error keeps it from driving."
         => forbidding(|_, what| matches!(what, Permission::RefuseHelpless));
+    fault "urgent-refuses-orders" ["ERR-06"] "It takes no order over while it reports an URGENT error." because "That work does not go on is remarked on."
+        => letting(|agv, what| matches!(what, Permission::RefuseHelpless) && agv.errors.defect_level == "URGENT" && !agv.errors.is_empty());
     fault "refused-instant-fades" ["IACT-10", "ERR-09"] "The error of an instant action that it cannot perform is gone after a second."
         => fading(|agv, error| error.error_type == agv.config.errors.instant_action);
     fault "busy-refusal-fades" ["ORD-REJ-21", "ERR-09"] "The error of an order that came while it was busy is gone after a second."
