@@ -84,7 +84,7 @@ records! {
             }
             true
         });
-    fault "failed-retriable-keeps-running" ["RETRY-01"] "An action that may be tried again stays RUNNING when it has failed."
+    fault "failed-retriable-keeps-running" ["RETRY-01"] "An action that may be tried again stays RUNNING when it has failed." because "To wait for a retry is a permission; what is neither is remarked on."
         => action(|_, action, m| {
             if action.request.retriable && matches!(action.status, Status::Retriable | Status::Failed) {
                 m.set("actionStatus", "RUNNING");
