@@ -101,9 +101,9 @@ fn what_is_on_board_or_cannot_be_used_is_refused() {
         "far",
         &[zone(
             "z",
-            "RELEASE",
+            "COORDINATED_REPLANNING",
             (9.0, 10.0),
-            &json!({ "releaseLossBehavior": "STOP" }),
+            &json!({}),
         )],
     );
     bench.send(

@@ -19,6 +19,8 @@ records! {
         => untold(|_, changes, _| changes.maps, Telling::Later);
     fault "zone-sets-without-state" ["STATE-23"] "Does not send a state when its zone sets change."
         => untold(|_, changes, _| changes.zone_sets, Telling::Later);
+    fault "requests-without-state" ["STATE-21"] "Does not send a state when its requests change."
+        => untold(|_, changes, _| changes.requests, Telling::Later);
     fault "node-without-state" ["STATE-06"] "Does not send a state when it drives over a node."
         => untold(|_, changes, _| changes.node && !changes.order, Telling::Never);
     fault "driving-without-state" ["STATE-08"] "Does not send a state when it starts or stops."
