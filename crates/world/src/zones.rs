@@ -157,7 +157,12 @@ impl ZonesSeen {
         let (Some(id), Some(map_id)) = (set.zone_set_id.text(), set.map_id.text()) else {
             return;
         };
-        let zones: Option<Vec<KnownZone>> = set.zones.iter().take(ZONES).map(|zone| KnownZone::read(id, zone)).collect();
+        let zones: Option<Vec<KnownZone>> = set
+            .zones
+            .iter()
+            .take(ZONES)
+            .map(|zone| KnownZone::read(id, zone))
+            .collect();
         let new = Known {
             map_id: map_id.to_owned(),
             doubtful: zones.is_none(),

@@ -6,6 +6,8 @@ mod directed;
 mod line_guided;
 mod listed;
 mod release;
+#[cfg(test)]
+mod release_tests;
 mod requests;
 mod sets;
 mod speed;

@@ -68,11 +68,7 @@ const LISTENS: &[Listen] = &[
     Listen::Connect,
 ];
 const READS: &[Fact] = &[Fact::Zones];
-const NEEDS: &[tck_view::Field] = &[
-    StateView::zone_sets,
-    StateView::zone_requests,
-    StateView::position,
-];
+const NEEDS: &[tck_view::Field] = &[StateView::zone_sets, StateView::zone_requests, StateView::position];
 
 /// How much longer than its end a grant may still be taken for one, in seconds.
 const LATE: f64 = 1.0;
@@ -248,8 +244,8 @@ impl Releases {
             }
             Question::Kept => {
                 access.holds |= entered && granted;
-                access.holds &= reach.is_none_or(|reach| reach > 0.0)
-                    && !access.may_have_ended(&self.answers, seen.now);
+                access.holds &=
+                    reach.is_none_or(|reach| reach > 0.0) && !access.may_have_ended(&self.answers, seen.now);
                 judged = access.holds && reach.is_some();
                 let shows = listed.iter().any(|request| request.request_status.is("GRANTED"));
                 if judged && !shows {
@@ -260,7 +256,10 @@ impl Releases {
                 access.behind = if used { access.behind + 1 } else { 0 };
                 if access.behind > BEHIND {
                     judged = true;
-                    found = Some(finding("still lists the request with which it went in", Some(Verdict::Warning)));
+                    found = Some(finding(
+                        "still lists the request with which it went in",
+                        Some(Verdict::Warning),
+                    ));
                 }
             }
             _ => {}
@@ -309,7 +308,10 @@ impl Running for Releases {
         };
         let mut judged = false;
         let mut in_force = BTreeSet::new();
-        for zone in zones.in_force(place.pose.map_id.as_str()).filter(|zone| zone.is("RELEASE")) {
+        for zone in zones
+            .in_force(place.pose.map_id.as_str())
+            .filter(|zone| zone.is("RELEASE"))
+        {
             in_force.insert((zone.set.clone(), zone.name().to_owned()));
             let (looked, found) = self.look(zone, zones.reach(zone, place), &seen);
             judged |= looked;

@@ -51,7 +51,10 @@ fn wrong(request: &ZoneRequest, state: &StateView, context: &CheckContext<'_>) -
         listed.zone_set_id.text() == Some(set) && listed.zone_set_status.is("ENABLED")
     };
     if state.zone_sets.is_there() && !sets.any(is_enabled) {
-        let text = format!("the request {id} is for the zone set {}, which is not ENABLED", quote(set));
+        let text = format!(
+            "the request {id} is for the zone set {}, which is not ENABLED",
+            quote(set)
+        );
         found.push(("ZREQ-03", text));
     }
     let (Some(zones), Some(name)) = (context.world.zones().of_set(set), request.zone_id.text()) else {
@@ -71,7 +74,10 @@ fn wrong(request: &ZoneRequest, state: &StateView, context: &CheckContext<'_>) -
     if let (Some(wanted), Some(said)) = (wanted(zone_type), said)
         && wanted != said
     {
-        let text = format!("the request {id} for a zone of type {zone_type} is of type {}", quote(said));
+        let text = format!(
+            "the request {id} for a zone of type {zone_type} is of type {}",
+            quote(said)
+        );
         found.push(("ZREQ-05", text));
     }
     found

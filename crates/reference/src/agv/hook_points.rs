@@ -190,6 +190,8 @@ pub(crate) enum Permission<'a> {
     TakeZoneSetAgain,
     /// A zone set is taken over with a kind of zone that it does not heed (ZSET-26).
     TakeZoneUnheeded,
+    /// A zone set is taken over with a RELEASE zone that does not say what follows when its release is lost (ZONE-13).
+    TakeReleaseUnsaid,
     /// A zone set is in force.
     ApplyZoneSet(&'a ZoneSet),
     /// A zone that is in force is heeded.

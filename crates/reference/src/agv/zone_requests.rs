@@ -71,30 +71,26 @@ impl Agv {
             .chain(changes.map(|change| (change.at, change.set, change.zone)))
             .filter(|(_, _, zone)| matches!(zone.kind, ZoneKind::Release(_)))
             .collect();
-        let locked: Vec<&(f64, &str, &Zone)> = met
+        let closed: Vec<&(f64, &str, &Zone)> = met
             .iter()
-            .filter(|(_, set, zone)| self.has_to_wait(set, zone))
+            .filter(|(_, set, zone)| !self.allows(Permission::EnterZone(zone), self.has_access(set, zone)))
             .collect();
-        let is_barred = |one: &&(f64, &str, &Zone)| locked.iter().any(|other| one.2.area.touches(&other.2.area));
+        let is_barred = |one: &&(f64, &str, &Zone)| closed.iter().any(|other| one.2.area.touches(&other.2.area));
         let free = met.iter().find(is_barred).map(|(at, ..)| (at - BEFORE).max(0.0));
-        let mut names: Vec<ZoneName> = Vec::new();
-        for (_, set, zone) in locked {
+        let mut wanted: Vec<ZoneName> = Vec::new();
+        for (_, set, zone) in met.iter().filter(|(_, set, zone)| !self.has_access(set, zone)) {
             let name = ((*set).to_owned(), zone.id.clone());
-            if !names.contains(&name) {
-                names.push(name);
+            if !wanted.contains(&name) {
+                wanted.push(name);
             }
         }
-        (names, free)
+        (wanted, free)
     }
 
-    /// Whether a zone may not be gone into, or through, yet (ZONE-10).
-    fn has_to_wait(&self, set: &str, zone: &Zone) -> bool {
+    /// Whether a zone may be gone into, or through (ZONE-10). What was lost inside is left as the zone says.
+    fn has_access(&self, set: &str, zone: &Zone) -> bool {
         let mut requests = self.requests.of_zone(set, &zone.id);
-        let granted = requests.any(|request| {
-            // What was lost inside is left as the zone says.
-            request.status == RequestStatus::Granted || request.inside && request.is_lost()
-        });
-        !self.allows(Permission::EnterZone(zone), granted)
+        requests.any(|request| request.status == RequestStatus::Granted || request.inside && request.is_lost())
     }
 
     /// Keeps in mind for which zones it waits, or will; whether these are others than before.
@@ -124,9 +120,7 @@ impl Agv {
                 request.status = RequestStatus::Granted;
                 request.lease = answer.lease;
                 let (id, zone) = (request.id.clone(), request.zone.clone());
-                self.requests
-                    .zones
-                    .retain(|other| other.id == id || other.zone != zone);
+                self.requests.zones.retain(|other| other.id == id || other.zone != zone);
             }
             Grant::Queued if status.is_open() => request.status = RequestStatus::Queued,
             Grant::Rejected if status.is_open() => self.withdraw_zone(&answer.request_id),
@@ -229,7 +223,8 @@ impl Agv {
             request.inside |= is_in && request.status == RequestStatus::Granted;
             let in_force = self.zone_of(&request.zone).is_some();
             let commanded = self.mode.takes_orders() && !self.order.cancelled;
-            let needed = in_force && commanded && !left && (request.inside || under_way);
+            let lost = self.requests.lost.iter().any(|lost| lost.zone == request.zone);
+            let needed = in_force && commanded && !left && (request.inside || under_way || lost && is_in);
             self.allows(Permission::KeepZoneRequest(&request), needed)
                 .then_some(request)
         });
@@ -256,13 +251,17 @@ impl Agv {
             let mut requests = self.requests.of_zone(&lost.zone.0, &lost.zone.1);
             !self.is_in_zone(&lost.zone) || requests.any(|request| request.status == RequestStatus::Granted)
         };
-        let (over, lost): (Vec<LostRelease>, Vec<LostRelease>) =
-            self.requests.lost.iter().cloned().partition(is_over);
+        let (over, lost): (Vec<LostRelease>, Vec<LostRelease>) = self.requests.lost.iter().cloned().partition(is_over);
         for one in &over {
             let name = self.loss_name(one.loss);
             self.errors.left_zone(&name, &one.zone.1);
         }
-        let stops = |lost: &LostRelease| self.allows(Permission::StayWithoutRelease(lost.loss), lost.loss == ReleaseLoss::Stop);
+        let stops = |lost: &LostRelease| {
+            self.allows(
+                Permission::StayWithoutRelease(lost.loss),
+                lost.loss == ReleaseLoss::Stop,
+            )
+        };
         let holds = lost.iter().any(stops);
         self.requests.lost = lost;
         let changed = holds != self.holds.access;

@@ -48,6 +48,21 @@ records! {
             .happens(|revoked, _, event| *revoked &= event != Event::Begun)
             .allows(|revoked, _, what, usual| usual || *revoked && matches!(what, Permission::EnterZone(_)));
 
+    fault "release-lease-over-entered-silently" ["ZREQ-12", "REQ-09"] "It says that a lease has run out, and goes into the RELEASE zone all the same."
+        => keep::<bool>()
+            .hears_answer(|leased, _, answer| *leased |= answer.lease.is_some())
+            .happens(|leased, _, event| *leased &= event != Event::Begun)
+            .allows(|leased, _, what, usual| usual || *leased && matches!(what, Permission::EnterZone(_)));
+    fault "release-revoked-request-kept" ["ZREQ-11"] "It goes on listing a request that was revoked before it went in, as REVOKED."
+        => plain().hears_answer(|_, agv, answer| {
+            let mut asked = agv.requests.zones.iter_mut();
+            let outside = asked.find(|request| request.id == answer.request_id && !request.inside);
+            if let Some(request) = outside.filter(|request| answer.grant == Grant::Revoked && request.status == RequestStatus::Granted) {
+                request.status = RequestStatus::Revoked;
+                agv.asks_later();
+            }
+        });
+
     fault "release-request-typed-replanning" ["ZREQ-05"] "The requestType of its request for a RELEASE zone is REPLANNING."
         => wording(|_, _, m| {
             m.set("requestType", "REPLANNING");
@@ -106,7 +121,6 @@ records! {
         });
     fault "release-requests-gone-in-semiautomatic" ["MODE-17", "ZREQ-10"] "It removes its requests for zones in SEMIAUTOMATIC."
         => forbidding(|agv, what| matches!(what, Permission::KeepZoneRequest(_)) && agv.mode == Mode::Semiautomatic);
-
     fault "release-lost-drives-on" ["ZONE-11", "ZREQ-13"] "It drives on in a RELEASE zone that says STOP when its release is lost, and reports the error."
         => forbidding(|_, what| matches!(what, Permission::StayWithoutRelease(ReleaseLoss::Stop)));
     fault "release-revoked-inside-unheeded" ["ZONE-11", "ZREQ-13", "REQ-12"] "It does not heed that a release is revoked when it is inside."
@@ -160,6 +174,14 @@ records! {
             } else if event == Event::Settled && let Some(error) = kept.take() {
                 agv.errors.active.retain(|other| *other != error);
             });
+    fault "release-lost-forgotten-by-hand" ["ZONE-12"] "Takes the error of a lost release back when somebody takes it over by hand, although it is still inside."
+        => plain().happens(|_, agv, event| if matches!(event, Event::ModeChanged(_)) && !agv.mode.takes_orders() {
+            let name = agv.config.errors.release_lost.clone();
+            agv.errors.active.retain(|error| error.error_type != name);
+        });
+    fault "release-without-behaviour-refused" ["ZONE-13"] "It refuses a zone set with a RELEASE zone that does not say what follows when its release is lost."
+        because "A table calls the member required; the ruling of ZONE-13 warns."
+        => forbidding(|_, what| matches!(what, Permission::TakeReleaseUnsaid));
     fault "release-loss-unsaid-continues" ["ZONE-13"] "It drives on when its release is lost in a zone that does not say what follows."
         => forbidding(|_, what| matches!(what, Permission::StopUnsaid));
     fault "release-evacuates-never" ["ZONE-14"] "It stops where a zone says EVACUATE."
