@@ -219,6 +219,7 @@ impl Agv {
         let moment = self.moment();
         self.motion.halt(moment);
         self.motion.reached = self.is_near(&order.nodes[0]);
+        self.requests.awaited.clear();
         let last = (std::mem::take(&mut self.order.last_node), self.order.last_sequence);
         self.order = OrderState::empty(last.0);
         self.order.last_sequence = last.1;

@@ -76,7 +76,6 @@ pub(crate) struct Change<'a> {
     /// Metres from the begin of the way.
     pub(crate) at: f64,
     /// zoneSetId.
-    #[allow(dead_code, reason = "for what is asked of fleet control about a zone")]
     pub(crate) set: &'a str,
     pub(crate) zone: &'a Zone,
     /// Into it, not out of it.

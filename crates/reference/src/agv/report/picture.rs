@@ -56,6 +56,9 @@ impl Agv {
         if self.config.uses("releaseRequired") {
             set("edgeRequests", self.edge_requests());
         }
+        if self.config.asks_for_zones() {
+            set("zoneRequests", self.zone_requests());
+        }
         set("batteryState", self.battery());
         set("operatingMode", json!(self.mode_literal()));
         set("errors", self.errors_picture());

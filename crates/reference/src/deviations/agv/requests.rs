@@ -125,8 +125,12 @@ records! {
             answer.request_id.clear();
         });
     fault "response-to-another-taken" ["REQ-17", "CORR-14"] "It takes any response for an answer to its own request."
-        => hearing(|agv, answer| if let Some(request) = agv.requests.edges.first() {
-            answer.request_id.clone_from(&request.id);
+        => hearing(|agv, answer| {
+            let edges = agv.requests.edges.iter().map(|request| &request.id);
+            let mut asked = edges.chain(agv.requests.zones.iter().map(|request| &request.id));
+            if let Some(id) = asked.next() {
+                answer.request_id.clone_from(id);
+            }
         });
     fault "corridor-grant-kept-for-later" ["CORR-17"] "It leaves its trajectory once more on an edge for which it was granted a corridor before, and does not ask again."
         => keep::<BTreeSet<u32>>()
