@@ -194,6 +194,8 @@ records! {
         => latched(|agv, event| event == Event::Releasing && agv.holds.emergency, |m| m.part("safetyState", |safety| safety.set("eStop", "MANUAL")));
     fault "field-violation-latched" ["STATE-MSG-17"] "After the safety field is free again fieldViolation stays true until the next order."
         => latched(|agv, event| event == Event::FieldFreed && agv.holds.field, |m| m.part("safetyState", |safety| safety.set("fieldViolation", true)));
+    fault "pausable-actions-run-on" ["ACT-15", "ACT-43"] "It reports startPause FINISHED as soon as it stands, and running actions go on although it says that they can be paused."
+        => forbidding(|agv, what| matches!(what, Permission::HoldActions) && agv.holds.pause && !agv.holds.button && !agv.holds.emergency && !agv.holds.field);
     tolerance "actions-run-on-in-pause" ["ACT-15", "ACT-18"] "Running actions go on while it is paused by startPause."
         => forbidding(|agv, what| matches!(what, Permission::HoldActions) && agv.holds.pause && !agv.holds.button && !agv.holds.emergency && !agv.holds.field);
     tolerance "resumes-in-a-moment" ["ASTATE-04", "ACT-18"] "Lets held actions go on half a second after the pause has ended."
