@@ -25,6 +25,26 @@ records! {
             .happens(|critical, agv, event| if event == Event::Settled && std::mem::take(critical) {
                 agv.give_up_order();
             });
+    fault "fatal-error-clears-order" ["ORD-CLEAR-11"] "It gives its order up as soon as something keeps it from running."
+        => keep::<bool>()
+            .raises(|fatal, _, _, error| {
+                *fatal |= error.fatal;
+                true
+            })
+            .happens(|fatal, agv, event| if event == Event::Settled && std::mem::take(fatal) {
+                agv.give_up_order();
+            });
+    fault "waiting-order-times-out" ["ORD-CLEAR-11"] "It gives an order up that has waited for its release for ten seconds."
+        => keep::<Option<Moment>>()
+            .happens(|since, agv, event| if matches!(event, Event::Settled | Event::Woken) {
+                let waits = agv.waits_at_decision_point() && agv.order.cancel.is_none();
+                *since = waits.then(|| since.unwrap_or(agv.moment()));
+                if since.is_some_and(|since| agv.moment().since(since) >= Duration::from_secs(10)) {
+                    *since = None;
+                    agv.give_up_order();
+                }
+            })
+            .due(|since, _| since.map(|since| since + Duration::from_secs(10)));
     fault "refused-instant-fades" ["IACT-10", "ERR-09"] "The error of an instant action that it cannot perform is gone after a second."
         => fading(|agv, error| error.error_type == agv.config.errors.instant_action);
     fault "busy-refusal-fades" ["ORD-REJ-21", "ERR-09"] "The error of an order that came while it was busy is gone after a second."

@@ -109,7 +109,7 @@ records! {
         => forbidding(|_, what| matches!(what, Permission::ActInZone(_, Passage::Entry)));
     fault "zone-actions-inside-left-out" ["ZONE-18"] "Does not do what an ACTION zone asks for while it is inside."
         => forbidding(|_, what| matches!(what, Permission::ActInZone(_, Passage::During)));
-    fault "zone-exit-actions-on-entry" ["ZONE-18"] "Does everything that an ACTION zone asks for when it goes in, also what is meant for its exit."
+    fault "zone-exit-actions-on-entry" ["ZONE-18"] "Does everything that an ACTION zone asks for when it goes in, also what is meant for its exit." because "The observation of ZONE-18 makes a wrong moment a warning."
         => when(Event::ZoneSetStored, |agv| {
             for zone in agv.zone_sets.all.last_mut().into_iter().flat_map(|set| &mut set.zones) {
                 if let ZoneKind::Action { entry, during, exit } = &mut zone.kind {
