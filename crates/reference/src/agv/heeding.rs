@@ -56,7 +56,7 @@ pub(crate) struct Heeding {
     /// Counts what it goes into and out of.
     passages: u32,
     /// Counts actions of zones.
-    actions: u32,
+    pub(crate) actions: u32,
 }
 
 impl Heeding {
