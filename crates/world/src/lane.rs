@@ -84,7 +84,9 @@ impl OrderedPlace {
             x: sane(&position.x)?,
             y: sane(&position.y)?,
             theta: sane(&position.theta),
-            deviation: deviation.and_then(Deviation::radius).filter(|radius| is_sane(*radius)),
+            deviation: deviation
+                .and_then(Deviation::farthest)
+                .filter(|radius| is_sane(*radius)),
             deviation_theta: sane(&position.allowed_deviation_theta),
         })
     }
