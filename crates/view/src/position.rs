@@ -54,23 +54,37 @@ pub enum Deviation {
 }
 
 impl Deviation {
-    /// How far off the vehicle may be in some direction, in metres: the radius, or the longer half axis.
+    /// Metres by which a vehicle may be off in the direction in which it may be off most: the radius, or the long half axis.
     #[must_use]
     pub fn farthest(&self) -> Option<f64> {
-        self.half_axis(f64::max)
-    }
-
-    /// How far off the vehicle may be in every direction, in metres: the radius, or the shorter half axis.
-    #[must_use]
-    pub fn everywhere(&self) -> Option<f64> {
-        self.half_axis(f64::min)
-    }
-
-    fn half_axis(&self, of: fn(f64, f64) -> f64) -> Option<f64> {
         match self {
             Self::Radius(radius) => Some(radius.float()),
-            Self::Ellipse(ellipse) => Some(of(ellipse.a.float()?, ellipse.b.float()?)),
+            Self::Ellipse(ellipse) => Some(ellipse.a.float()?.max(ellipse.b.float()?)),
         }
+    }
+
+    /// Metres by which a vehicle may be off in whatever direction: the radius, or the short half axis.
+    #[must_use]
+    pub fn nearest(&self) -> Option<f64> {
+        match self {
+            Self::Radius(radius) => Some(radius.float()),
+            Self::Ellipse(ellipse) => Some(ellipse.a.float()?.min(ellipse.b.float()?)),
+        }
+    }
+
+    /// Whether a vehicle may be off by so much along x and y, with a margin, in metres.
+    #[must_use]
+    pub fn allows(&self, (x, y): (f64, f64), margin: f64) -> bool {
+        let (a, b, theta) = match self {
+            Self::Radius(radius) => (radius.float(), radius.float(), 0.0),
+            Self::Ellipse(ellipse) => (
+                ellipse.a.float().unwrap_or_default(),
+                ellipse.b.float().unwrap_or_default(),
+                ellipse.theta.float().unwrap_or_default(),
+            ),
+        };
+        let (along, across) = (x * theta.cos() + y * theta.sin(), y * theta.cos() - x * theta.sin());
+        (along / (a.max(0.0) + margin)).hypot(across / (b.max(0.0) + margin)) <= 1.0
     }
 }
 

@@ -36,6 +36,14 @@ records! {
         => position(|p| p.change("allowedDeviationXY", |allowed| if let Some(radius) = allowed.as_f64() {
             *allowed = json!({ "a": radius, "b": radius * 2.0, "theta": 0.0 });
         }));
+    fault "deviation-as-plain-number" ["ORD-MSG-09"] "allowedDeviationXY is a number, as in 2.x, and no ellipse."
+        => writing("order", |text| {
+            let Ok(mut message) = serde_json::from_slice::<Value>(text) else { return };
+            let nodes = message["nodes"].as_array_mut().into_iter().flatten();
+            let positions = nodes.filter_map(|node| node.get_mut("nodePosition")?.as_object_mut());
+            positions.for_each(|place| place.change("allowedDeviationXY", |allowed| if let Some(radius) = allowed.get("a").cloned() { *allowed = radius; }));
+            *text = message.to_string().into_bytes();
+        });
     fault "orders-to-the-sleeping" ["HIB-13"] "It sends orders to a vehicle that sleeps."
         => letting(|_, vehicle, what| asleep(vehicle) && matches!(what, Permission::Reach));
     fault "actions-to-the-sleeping" ["HIB-13"] "It sends instant actions to a vehicle that sleeps, as to one that is awake."
@@ -73,6 +81,19 @@ records! {
         });
     fault "skip-names-another-action" ["RETRY-08"] "skipRetry names an action that there is not."
         => typed("skipRetry", |a| a.each("actionParameters", |parameter| parameter.set("value", "action-0")));
+    fault "retry-of-what-has-failed-for-good" ["RETRY-08"] "It sends retry for an action that is FAILED and cannot be tried again."
+        => keep::<BTreeSet<String>>().happens(|tried, site, vehicle, event| if let Event::State(_) = event {
+            let Some((state, running)) = vehicle.state.as_ref().zip(vehicle.running.as_ref()) else { return };
+            let failed = |id: &&str| state.action(id).is_some_and(|action| action.action_status == "FAILED");
+            let failed: Vec<String> = running.action_ids().filter(failed).map(str::to_owned).collect();
+            for id in failed {
+                if tried.insert(id.clone()) { site.instant(vehicle, "retry", &json!({ "actionId": id })); }
+            }
+        });
+    fault "fleet-trigger-called-host" ["TRIG-03", "ACT-31"] "It calls its own trigger HOST, and writes that as a text and not as a list."
+        => parameter_of("triggerType", |p| p.change("value", |value| {
+            if value.as_array().is_some_and(|types| types.contains(&json!("FLEET_CONTROL"))) { *value = json!("HOST"); }
+        }));
     fault "trigger-type-as-text" ["ACT-31", "BP-05", "FACT-15"] "triggerType is a text and not a list of texts."
         => parameter_of("triggerType", |p| p.change("value", |value| if let Some(first) = value.get(0).cloned() { *value = first; }));
     fault "trigger-type-in-its-own-words" ["TRIG-03"] "It calls its own trigger FLEET and that at the vehicle BUTTON."
