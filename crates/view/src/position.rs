@@ -54,15 +54,6 @@ pub enum Deviation {
 }
 
 impl Deviation {
-    /// The radius, where it is one.
-    #[must_use]
-    pub const fn radius(&self) -> Option<f64> {
-        match self {
-            Self::Radius(radius) => Some(radius.float()),
-            Self::Ellipse(_) => None,
-        }
-    }
-
     /// Metres by which a vehicle may be off in the direction in which it may be off most: the radius, or the long half axis.
     #[must_use]
     pub fn farthest(&self) -> Option<f64> {

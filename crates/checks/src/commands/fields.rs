@@ -139,7 +139,7 @@ fn position_range(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<
         if let Some(allowed) = position
             .allowed_deviation_xy
             .there()
-            .and_then(Deviation::radius)
+            .and_then(Deviation::nearest)
             .filter(|allowed| *allowed < 0.0)
         {
             found.broken(

@@ -30,6 +30,13 @@ records! {
         });
     fault "obeys-in-its-sleep" ["HIB-06"] "It takes orders and instant actions in hibernation, and shows them when it wakes."
         => letting(|_, what| matches!(what, Permission::HeedAsleep));
+    fault "answers-in-its-sleep" ["HIB-06"] "It answers a stateRequest or a factsheetRequest in hibernation, and sleeps on."
+        => plain().hears(|(), agv, name, payload| {
+            if agv.sleep.asleep && name == "instantActions" {
+                answer_asleep(agv, payload);
+            }
+            true
+        });
     fault "takes-up-what-it-slept-through" ["HIB-06"] "It works off what it was sent in hibernation as soon as it wakes."
         => keep::<Vec<Vec<u8>>>()
             .hears(|missed, agv, name, payload| {
@@ -84,6 +91,13 @@ records! {
             }
             true
         });
+    fault "failed-retriable-keeps-running" ["RETRY-01"] "An action that may be tried again stays RUNNING when it has failed." because "To wait for a retry is a permission; what is neither is remarked on."
+        => action(|_, action, m| {
+            if action.request.retriable && matches!(action.status, Status::Retriable | Status::Failed) {
+                m.set("actionStatus", "RUNNING");
+            }
+            true
+        });
     fault "retriable-survives-cancel" ["ORD-CANCEL-27", "RETRY-06"] "An action that waits for a retry goes on waiting when its order is cancelled."
         => breaking(|_, action, usual| usual.filter(|_| action.status != Status::Retriable));
     fault "flags-without-state" ["STATE-18", "STATE-19"] "It sends no state of its own when paused or safetyState changes."
@@ -106,4 +120,27 @@ records! {
         => after(Effect::Trigger, |_, _, _| Outcome::Done(None));
     fault "any-trigger-will-do" ["ACT-37"] "A button on the vehicle ends what waits for the fleet control alone." because "The text does not say that nothing else may end it."
         => letting(|_, what| matches!(what, Permission::HeedTrigger(action) if action.status == Status::Running));
+    fault "certificate-fetched-in-clear" ["CERT-03"] "It fetches key and certificate over plain HTTP, and takes them over."
+        => forbidding(|_, what| matches!(what, Permission::RefusePlainLink));
+    tolerance "never-waits-for-a-retry" ["RETRY-01"] "A retriable action that fails is FAILED at once."
+        => failure(|agv, action, _| {
+            if action.status == Status::Retriable {
+                agv.end_failed(&action.request.id);
+            }
+            true
+        });
+}
+
+/// Takes the requests for a state and a factsheet out of an instantActions message, and answers them.
+fn answer_asleep(agv: &mut Agv, payload: &[u8]) {
+    let Ok(mut message) = serde_json::from_slice::<Value>(payload) else {
+        return;
+    };
+    if let Some(actions) = message.get_mut("actions").and_then(Value::as_array_mut) {
+        actions.retain(|action| matches!(action["actionType"].as_str(), Some("stateRequest" | "factsheetRequest")));
+        if !actions.is_empty() {
+            agv.sleep.speaks = true;
+            agv.instant_actions_received(message.to_string().as_bytes());
+        }
+    }
 }

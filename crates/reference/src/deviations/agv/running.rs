@@ -223,6 +223,10 @@ records! {
         => letting(|_, what| matches!(what, Permission::DriveDuring(action) if is_soft(action)));
     fault "hard-drives" ["BLOCK-04"] "Drives while a HARD action runs."
         => letting(|_, what| matches!(what, Permission::DriveDuring(action) if action.request.blocking == Blocking::Hard));
+    fault "single-holds" ["BLOCK-09"] "It stands while a SINGLE action runs." because "To drive on is a permission; a vehicle that stands is remarked on."
+        => forbidding(|_, what| matches!(what, Permission::DriveDuring(action) if action.request.blocking == Blocking::Single));
+    fault "edge-passes-single" ["BLOCK-11"] "An action of an edge begins beside a SINGLE action of the node before it." because "A figure shows an overlap, so that it is remarked on."
+        => forbidding(|_, what| matches!(what, Permission::Await(action, origin) if action.request.blocking == Blocking::Single && action.origin != origin));
     fault "trigger-not-awaited" ["ACT-37"] "Ends waitForTrigger by itself."
         => triggered(|| MOMENT);
     fault "trigger-given-up" ["ACT-37"] "Waits for a trigger for a second and a half only."
