@@ -111,7 +111,7 @@ records! {
             usual.filter(|_| !queued)
         })
         .allows(|_, _, what, usual| usual && !matches!(what, Permission::ForgetQueue));
-    fault "cancel-drops-waiting" ["ORD-CANCEL-12", "ORD-CANCEL-03"] "cancelOrder removes the actions that have not begun from actionStates instead of reporting them FAILED."
+    fault "cancel-drops-waiting" ["ORD-CANCEL-12", "ORD-CANCEL-03", "STATE-MSG-10"] "cancelOrder removes the actions that have not begun from actionStates instead of reporting them FAILED."
         => keep::<Vec<String>>()
             .does(|waiting, agv, action| {
                 if is(action, Effect::CancelOrder) {
@@ -134,7 +134,7 @@ records! {
         => plain()
             .happens(|(), agv, event| if event == Event::CancelBegun { agv.flush() })
             .allows(|(), _, what, usual| usual && !matches!(what, Permission::CancelAwaits(_)));
-    fault "cancel-not-running" ["ORD-CANCEL-06", "ASTATE-05"] "It reports cancelOrder WAITING instead of RUNNING as long as an action is still running."
+    fault "cancel-not-running" ["ORD-CANCEL-06", "ASTATE-05", "ORD-CANCEL-29"] "It reports cancelOrder WAITING instead of RUNNING as long as an action is still running."
         => when(Event::CancelBegun, |agv| if let Some(cancel) = &agv.order.cancel && let Some(action) = agv.actions.get_mut(&cancel.action_id) {
             action.status = Status::Waiting;
         })

@@ -132,7 +132,7 @@ records! {
                 answer.request_id.clone_from(id);
             }
         });
-    fault "corridor-grant-kept-for-later" ["CORR-17"] "It leaves its trajectory once more on an edge for which it was granted a corridor before, and does not ask again."
+    fault "corridor-grant-kept-for-later" ["CORR-17", "CORR-16"] "It leaves its trajectory once more on an edge for which it was granted a corridor before, and does not ask again."
         => keep::<BTreeSet<u32>>()
             .hears_answer(|granted, agv, answer| {
                 let request = agv.requests.edges.iter().find(|request| request.id == answer.request_id);

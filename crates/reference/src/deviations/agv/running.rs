@@ -248,7 +248,7 @@ records! {
         => triggered(|| Duration::from_millis(1));
     fault "finished-actions-removed" ["STATE-MSG-10"] "Removes actions from its states when they are done."
         => forgetting(|_| true);
-    fault "finished-instant-forgotten" ["STATE-MSG-09", "STATE-MSG-10", "IACT-STATE-01"] "Removes instant actions from its states when they are done."
+    fault "finished-instant-forgotten" ["STATE-MSG-09", "STATE-MSG-10", "IACT-STATE-01", "ACT-26"] "Removes instant actions from its states when they are done."
         => forgetting(|action| !action.of_order());
     fault "action-errors-never-clear" ["ERR-01"] "It never removes the error of a failed action, also not after the next orders were accepted and completed."
         => failure(|_, _, e| {
