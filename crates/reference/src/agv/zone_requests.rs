@@ -194,7 +194,9 @@ impl Agv {
 
     /// Looks after its requests for zones; whether anything has changed.
     pub(crate) fn tend_zone_requests(&mut self) -> bool {
-        if !self.config.heeds("RELEASE") {
+        let requests = &self.requests;
+        let has_any = !(requests.zones.is_empty() && requests.awaited.is_empty() && requests.lost.is_empty());
+        if !has_any && !self.holds.access {
             return false;
         }
         let before = self.requests.zones.clone();
@@ -253,8 +255,10 @@ impl Agv {
         };
         let (over, lost): (Vec<LostRelease>, Vec<LostRelease>) = self.requests.lost.iter().cloned().partition(is_over);
         for one in &over {
-            let name = self.loss_name(one.loss);
-            self.errors.left_zone(&name, &one.zone.1);
+            let names = &self.config.errors;
+            for name in [&names.release_lost, &names.release_loss] {
+                self.errors.left_zone(name, &one.zone.1);
+            }
         }
         let stops = |lost: &LostRelease| {
             self.allows(
