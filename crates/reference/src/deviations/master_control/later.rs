@@ -36,6 +36,10 @@ records! {
         => position(|p| p.change("allowedDeviationXY", |allowed| if let Some(radius) = allowed.as_f64() {
             *allowed = json!({ "a": radius, "b": radius * 2.0, "theta": 0.0 });
         }));
+    fault "ellipse-without-direction" ["ORD-MSG-09"] "allowedDeviationXY has half axes and no theta."
+        => elliptic(json!({ "a": 0.4, "b": 0.2 }));
+    fault "ellipse-in-degrees" ["ORD-MSG-09"] "The theta of allowedDeviationXY is in degrees."
+        => elliptic(json!({ "a": 0.4, "b": 0.2, "theta": 90.0 }));
     fault "deviation-as-plain-number" ["ORD-MSG-09"] "allowedDeviationXY is a number, as in 2.x, and no ellipse."
         => writing("order", |text| {
             let Ok(mut message) = serde_json::from_slice::<Value>(text) else { return };
@@ -64,6 +68,14 @@ records! {
     fault "lists-never-cleared" ["IACT-STATE-07"] "It never has the list of instant actions cleared."
         because "IACT-STATE-07 is a recommendation."
         => forbidding(|_, _, what| matches!(what, Permission::Clear("clearInstantActions")));
+    fault "zone-lists-never-cleared" ["ZACT-STATE-08"] "It never has the list of actions in zones cleared."
+        because "ZACT-STATE-08 is a recommendation."
+        => forbidding(|_, _, what| matches!(what, Permission::Clear("clearZoneActions")));
+    fault "position-under-its-old-name" ["ACT-08", "FACT-15"] "It calls initializePosition by the name of earlier versions, initPosition."
+        => writing("instantActions", |text| {
+            let old = String::from_utf8_lossy(text).replace("initializePosition", "initPosition");
+            *text = old.into_bytes();
+        });
     fault "certificate-over-http" ["CERT-05"] "The links of updateCertificate are without TLS."
         => parameter(|kind, p| if kind == "updateCertificate" {
             p.change("value", |link| *link = json!(link.as_str().unwrap_or_default().replace("https:", "http:")));
@@ -146,6 +158,20 @@ fn naming_in(kind: &'static str, key: &'static str, change: fn(&Value) -> Value)
                 });
             }
         });
+        true
+    })
+}
+
+/// Says where a vehicle may be beside a node by this ellipse, where a version has ellipses.
+fn elliptic(ellipse: Value) -> Box<dyn Deviation> {
+    holding(ellipse).sends(|ellipse, _, vehicle, outgoing| {
+        if vehicle.config.has("requests") {
+            outgoing.message.each("nodes", |node| {
+                node.part("nodePosition", |place| {
+                    place.change("allowedDeviationXY", |allowed| *allowed = ellipse.clone())
+                });
+            });
+        }
         true
     })
 }

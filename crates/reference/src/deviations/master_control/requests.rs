@@ -39,6 +39,27 @@ records! {
     fault "requests-unanswered-after-a-cut" ["REQ-03"] "It answers no request any more once its own connection was lost."
         => keep::<bool>().happens(|cut, _, _, event| if let Event::Connected(true) = event { *cut = true; })
             .decides(|cut, _, _, _, usual| usual.filter(|_| !*cut));
+    fault "responses-to-the-first-vehicle" ["REQ-03"] "It publishes responses to any vehicle on the topic of the first vehicle of its fleet."
+        => sending(|site, _, out| if out.name == "responses" {
+            let first = site.config.vehicles.first().and_then(|first| first.topics.get("responses"));
+            first.into_iter().for_each(|topic| out.topic.clone_from(topic));
+        });
+    fault "answers-under-the-first-id" ["REQ-03", "REQ-04"] "It answers every request of a vehicle under the requestId of the first one."
+        => keep::<Option<String>>().sends(|first, _, _, outgoing| {
+            outgoing.message.each("responses", |answer| {
+                let id = first.get_or_insert_with(|| answer.text("requestId").to_owned()).clone();
+                answer.set("requestId", id);
+            });
+            true
+        });
+    fault "lease-prolonged-by-nothing" ["REQ-11"] "It prolongs a lease by a response with the same leaseExpiry as before."
+        => fleet::<BTreeMap<String, Value>>().sends(|ends, _, _, outgoing| {
+            outgoing.message.each("responses", |answer| if let Some(end) = answer.get("leaseExpiry").cloned() {
+                let first = ends.entry(answer.text("requestId").to_owned()).or_insert(end).clone();
+                answer.set("leaseExpiry", first);
+            });
+            true
+        });
     fault "queued-for-ever" ["REQ-03"] "A request that it has queued it never grants."
         because "To be queued is an answer, and no time is given for the next one."
         => deciding(|_, _, claim, usual| usual.map(|grant| if claim.said == Some(Grant::Queued) { Grant::Queued } else { grant }));

@@ -39,6 +39,11 @@ records! {
         });
     fault "orders-before-zones" ["ZSET-08"] "It sends an order while the zones of its map are on their way to the vehicle."
         => letting(|_, _, what| matches!(what, Permission::ZonesReady));
+    fault "zone-sets-to-the-first-vehicle" ["TOPIC-04", "HDR-05"] "It publishes sets of zones for any vehicle on the topic of the first vehicle of its fleet."
+        => sending(|site, _, out| if out.name == "zoneSet" {
+            let first = site.config.vehicles.first().and_then(|first| first.topics.get("zoneSet"));
+            first.into_iter().for_each(|topic| out.topic.clone_from(topic));
+        });
     fault "zone-ids-repeated" ["ZSET-19"] "All zones of a set have the same id."
         => zone(|zone| zone.set("zoneId", "zone"));
     fault "zone-type-unknown" ["ZSET-19"] "It writes types of zones in small letters."
