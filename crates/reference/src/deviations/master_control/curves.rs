@@ -81,6 +81,8 @@ records! {
         => corridor(|c| c.unset("leftWidth"));
     fault "corridor-point-unknown" ["CORR-09", "JSON-02"] "Names the reference point of corridors with an underscore."
         => corridor(|c| c.set("corridorRefPoint", "KINEMATIC_CENTER"));
+    fault "corridor-point-in-words" ["CORR-09", "JSON-02"] "Names the reference point of corridors in words."
+        => corridor(|c| c.set("corridorRefPoint", "kinematic centre"));
     fault "corridor-widths-as-text" ["CORR-09", "JSON-06", "JSON-10"] "leftWidth and rightWidth of a corridor are strings."
         => corridor(|c| for key in ["leftWidth", "rightWidth"] { c.change(key, |width| *width = json!(width.as_f64().unwrap_or_default().to_string())); });
     fault "corridor-as-one-width" ["CORR-09", "JSON-10"] "It gives a corridor one member width instead of leftWidth and rightWidth."

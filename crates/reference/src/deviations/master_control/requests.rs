@@ -100,7 +100,7 @@ records! {
             outgoing.message.each("responses", |answer| answer.change("leaseExpiry", |end| *end = json!(format!("{over:.3}"))));
             true
         });
-    fault "lease-prolonged-under-another-id" ["REQ-11"] "It prolongs a lease by a response with a requestId of its own."
+    fault "lease-prolonged-under-another-id" ["REQ-11"] "It prolongs a lease by a response with a requestId of its own." because "To prolong a lease is a permission, so that what is said about it is remarked on."
         => fleet::<BTreeSet<String>>().sends(|granted, _, _, outgoing| {
             outgoing.message.each("responses", |answer| {
                 let id = answer.text("requestId").to_owned();
