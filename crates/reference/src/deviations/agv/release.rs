@@ -29,7 +29,7 @@ records! {
             .hears_answer(|rejected, _, answer| *rejected |= answer.grant == Grant::Rejected)
             .happens(|rejected, _, event| *rejected &= event != Event::Begun)
             .allows(|rejected, _, what, usual| usual || *rejected && matches!(what, Permission::EnterZone(_)));
-    fault "release-zone-by-centre" ["ZONE-03", "ZONE-10"] "Counts as outside a RELEASE zone until its kinematic centre is inside."
+    fault "release-zone-by-centre" ["ZONE-10", "ZONE-03"] "Counts as outside a RELEASE zone until its kinematic centre is inside."
         => forbidding(|_, what| matches!(what, Permission::GoByContour(zone) if is_release(zone)));
     fault "release-zones-unseen" ["ZONE-10", "ZREQ-01"] "Takes no notice of RELEASE zones."
         => forbidding(|_, what| matches!(what, Permission::HeedZone(zone) if is_release(zone)));
