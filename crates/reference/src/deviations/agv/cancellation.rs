@@ -7,6 +7,14 @@ use super::prelude::*;
 records! {
     fault "cancels-whatever-order" ["ORD-CANCEL-25", "ORD-CANCEL-18"] "Cancels the order that it has, whatever order cancelOrder names."
         => forbidding(|_, what| matches!(what, Permission::LeaveOrder));
+    fault "another-cancel-halts" ["ORD-CANCEL-25"] "Keeps its order when cancelOrder names another one, and drives no more until it gets a new one."
+        => parked()
+            .does(|parked, agv, action| {
+                let named = action.text("orderId");
+                *parked |= is(action, Effect::CancelOrder) && !named.is_empty() && named != agv.order.order_id;
+                None
+            })
+            .happens(|parked, _, event| *parked &= event != Event::Begun);
     fault "named-order-not-cancelled" ["ORD-CANCEL-24"] "Takes a cancelOrder that names an order for one without an order."
         => letting(|_, what| matches!(what, Permission::LeaveOrder));
     fault "cancel-drives-on" ["ORD-CANCEL-02"] "Drives its base to the end before it obeys cancelOrder."

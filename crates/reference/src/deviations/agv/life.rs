@@ -67,6 +67,8 @@ records! {
         => forbidding(|agv, what| agv.sleep.blocked && matches!(what, Permission::HeedSwitch));
     fault "shuts-down-mid-order" ["SHUT-01"] "It shuts down although it has an order."
         => forbidding(|_, what| matches!(what, Permission::RefuseShutdown));
+    fault "refused-shutdown-done" ["SHUT-01"] "It says that shutdown has failed while it has an order, and is off a moment later."
+        => failed(Effect::Shutdown, |agv, _| agv.shut_down());
     fault "shutdown-ends-the-order" ["SHUT-01"] "It refuses to shut down while it has an order, and gives the order up all the same."
         => failed(Effect::Shutdown, |agv, _| agv.give_up_order());
     fault "shutdown-is-a-word" ["SHUT-02"] "It reports shutdown FINISHED and stays where it is."
@@ -100,6 +102,15 @@ records! {
         });
     fault "retriable-survives-cancel" ["ORD-CANCEL-27", "RETRY-06"] "An action that waits for a retry goes on waiting when its order is cancelled."
         => breaking(|_, action, usual| usual.filter(|_| action.status != Status::Retriable));
+    fault "pause-lingers" ["STATE-18"] "It goes on saying that it is paused for five seconds after the pause has ended."
+        => keep::<Option<Moment>>()
+            .happens(|until, agv, event| if event == Event::Resuming { *until = Some(agv.moment() + Duration::from_secs(5)) })
+            .says(|until, agv, part, m| {
+                if until.is_some_and(|until| agv.moment() < until) && matches!(part, Part::State) {
+                    m.set("paused", true);
+                }
+                true
+            });
     fault "flags-without-state" ["STATE-18", "STATE-19"] "It sends no state of its own when paused or safetyState changes."
         => plain().tells(|(), _, changes, _| match changes.other && !changes.actions && !changes.error {
             true => Telling::Later,

@@ -47,6 +47,10 @@ records! {
                 }
             })
             .due(|since, _| since.map(|since| since + Duration::from_secs(10)));
+    fault "unsupported-refusal-fades" ["ORD-REJ-19", "ERR-09"] "The error of a parameter that it does not support is gone after a second."
+        => fading(|agv, error| error.error_type == agv.config.errors.unsupported);
+    fault "outside-corridor-named-otherwise" ["CORR-07"] "The error of a robot outside its corridor has a type of its own." because "Any error says that something is wrong, so that its name is remarked on."
+        => error(|agv, error, m| if error.error_type == agv.config.errors.outside_of_corridor { m.set("errorType", "offTrack") });
     fault "refused-instant-fades" ["IACT-10", "ERR-09"] "The error of an instant action that it cannot perform is gone after a second."
         => fading(|agv, error| error.error_type == agv.config.errors.instant_action);
     fault "busy-refusal-fades" ["ORD-REJ-21", "ERR-09"] "The error of an order that came while it was busy is gone after a second."

@@ -13,6 +13,17 @@ records! {
                 *phases = [phases.drain(..).flatten().collect()].into();
             }
         });
+    fault "others-beside-single" ["BLOCK-08"] "It begins what stands behind a SINGLE action in its list while that still runs."
+        => forbidding(|_, what| matches!(what, Permission::Await(action, origin) if action.request.blocking == Blocking::Single && action.origin == origin));
+    fault "single-first" ["BLOCK-10"] "It begins the SINGLE action of a list before those that stand before it."
+        => plain().queues(|(), agv, _, phases| {
+            let single = |ids: &Vec<String>| ids.iter().filter_map(|id| agv.actions.get(id)).any(|action| action.request.blocking == Blocking::Single);
+            if let Some(at) = phases.iter().position(single)
+                && let Some(phase) = phases.remove(at)
+            {
+                phases.push_front(phase);
+            }
+        });
     fault "actions-held-offline" ["MQTT-04"] "As long as the link is broken it drives on but begins no action of its order."
         => forbidding(|agv, what| matches!(what, Permission::Act) && !agv.connection.online);
     fault "semiautomatic-actions-held" ["MODE-02"] "It does not begin the actions of its order in SEMIAUTOMATIC."

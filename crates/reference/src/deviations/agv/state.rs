@@ -122,6 +122,10 @@ records! {
                 }
                 true
             });
+    fault "instant-actions-in-both-lists" ["IACT-STATE-03"] "It lists instant actions among the actions of its order, too."
+        => state(|_, m| for action in m.list("instantActionStates").to_vec() { m.add("actionStates", action); });
+    fault "order-actions-in-both-lists" ["IACT-STATE-03"] "It lists the actions of its order among the instant actions, too."
+        => state(|_, m| for action in m.list("actionStates").to_vec() { m.add("instantActionStates", action); });
     fault "foreign-node-on-the-way" ["NODE-09"] "It names a tag beside its way as its last node while it drives an order."
         => state(|agv, m| if agv.order.entered && !agv.order.nodes.is_empty() {
             m.set("lastNodeId", "tag-17");

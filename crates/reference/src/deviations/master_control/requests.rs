@@ -87,8 +87,8 @@ records! {
             let granted = m.list("responses").iter().find(|answer| answer["grantType"] == "GRANTED").map(|answer| answer["requestId"].clone());
             if let Some(id) = granted { m.add("responses", json!({ "requestId": id, "grantType": "QUEUED" })) }
         });
-    fault "lease-of-what-is-not-granted" ["REQ-05"] "It says until when a request that is queued is valid."
-        => response(|answer| if answer.says("grantType", "QUEUED") { answer.set("leaseExpiry", "2099-01-01T00:00:00.000Z") });
+    fault "lease-of-what-is-not-granted" ["REQ-05"] "It says until when a request is valid that is queued or rejected."
+        => response(|answer| if answer.says("grantType", "QUEUED") || answer.says("grantType", "REJECTED") { answer.set("leaseExpiry", "2099-01-01T00:00:00.000Z") });
     fault "lease-in-seconds" ["REQ-05"] "leaseExpiry is a number of seconds."
         => response(|answer| answer.change("leaseExpiry", |end| *end = json!(20)));
     fault "lease-in-local-time" ["REQ-05"] "leaseExpiry is in local time, two hours ahead, and says so."

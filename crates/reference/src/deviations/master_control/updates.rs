@@ -10,7 +10,7 @@ records! {
             .allows(|_, _, _, what, usual| usual && !matches!(what, Permission::Gone));
     fault "update-id-kept" ["ORD-UPD-04"] "Does not raise orderUpdateId."
         => order(|m| m.set("orderUpdateId", 0));
-    fault "update-id-falls" ["ORD-UPD-04"] "Counts orderUpdateId down."
+    fault "update-id-falls" ["ORD-UPD-04", "ORD-UPD-14"] "Counts orderUpdateId down."
         => order(|m| m.set("orderUpdateId", 1000_u64.saturating_sub(m["orderUpdateId"].as_u64().unwrap_or_default())));
     fault "stitching-missing" ["ORD-UPD-05"] "Begins updates with the first new node."
         => update(|m| for list in ["nodes", "edges"] {
