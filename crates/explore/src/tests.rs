@@ -5,6 +5,7 @@
     reason = "a test may fail by panicking"
 )]
 
+mod newest;
 mod parts;
 
 use std::collections::{BTreeMap, BTreeSet};
