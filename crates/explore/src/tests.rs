@@ -5,7 +5,6 @@
     reason = "a test may fail by panicking"
 )]
 
-mod newest;
 mod parts;
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -227,9 +227,7 @@ records! {
         => making(|_, _, a, _, _| a.list("actionParameters").reverse());
     tolerance "several-instant-actions-in-one-message" ["IACT-01"] "It puts stateRequest beside the instant action asked for into one message."
         => sending(|site, vehicle, out| {
-            // One that sleeps is told nothing but to wake up (HIB-13).
-            let awake = vehicle.presence != Presence::Asleep;
-            let asks = awake && out.name == "instantActions" && !out.tells(&["stateRequest"]) && site.offers(vehicle, "stateRequest", "INSTANT");
+            let asks = out.name == "instantActions" && !out.tells(&["stateRequest"]) && site.offers(vehicle, "stateRequest", "INSTANT");
             let limit = vehicle.factsheet.as_ref().map_or(usize::MAX, |sheet| sheet.limit(&["instantActions", "instantActions.actions", "actions"]));
             if asks && out.message.list("actions").len() < limit.min(10) {
                 let question = site.made_action(vehicle, "stateRequest", &Value::Null, true);
