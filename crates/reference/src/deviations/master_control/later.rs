@@ -39,6 +39,7 @@ records! {
     fault "ellipse-without-direction" ["ORD-MSG-09"] "allowedDeviationXY has half axes and no theta."
         => elliptic(json!({ "a": 0.4, "b": 0.2 }));
     fault "ellipse-in-degrees" ["ORD-MSG-09"] "The theta of allowedDeviationXY is in degrees."
+        because "The document gives no range for it; the ruling of ORD-MSG-09 makes what the schema excludes a warning."
         => elliptic(json!({ "a": 0.4, "b": 0.2, "theta": 90.0 }));
     fault "deviation-as-plain-number" ["ORD-MSG-09"] "allowedDeviationXY is a number, as in 2.x, and no ellipse."
         => writing("order", |text| {

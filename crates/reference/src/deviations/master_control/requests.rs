@@ -52,14 +52,6 @@ records! {
             });
             true
         });
-    fault "lease-prolonged-by-nothing" ["REQ-11"] "It prolongs a lease by a response with the same leaseExpiry as before."
-        => fleet::<BTreeMap<String, Value>>().sends(|ends, _, _, outgoing| {
-            outgoing.message.each("responses", |answer| if let Some(end) = answer.get("leaseExpiry").cloned() {
-                let first = ends.entry(answer.text("requestId").to_owned()).or_insert(end).clone();
-                answer.set("leaseExpiry", first);
-            });
-            true
-        });
     fault "queued-for-ever" ["REQ-03"] "A request that it has queued it never grants."
         because "To be queued is an answer, and no time is given for the next one."
         => deciding(|_, _, claim, usual| usual.map(|grant| if claim.said == Some(Grant::Queued) { Grant::Queued } else { grant }));
