@@ -1,6 +1,6 @@
 //! Fields of orders that no schema can judge: arrays that are left out, positions, zones, identifiers, topics.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::PI;
 use std::sync::LazyLock;
 
 use super::{Command, Each, Found, elements, nodes_in_sequence};
@@ -31,7 +31,7 @@ pub(crate) const POSITION_RANGE: Check = Check {
     name: "commands/position-range",
     decides: &["ORD-MSG-09", "MAP-02"],
     doc: "theta of a node lies between minus pi and pi, allowedDeviationXY is not below 0, allowedDeviationTheta lies \
-          between 0 and pi. An ellipse whose a is less than its b, or whose theta is more than a quarter turn, is a warning. Coordinates \
+          between 0 and pi. An ellipse whose a is less than its b, or whose theta is more than a half turn, is a warning. Coordinates \
           that are far too big for metres are a warning.",
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
@@ -160,10 +160,10 @@ fn position_range(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<
             found.remark("ORD-MSG-09", text);
         }
         if let Some(Deviation::Ellipse(ellipse)) = position.allowed_deviation_xy.there()
-            && let Some(theta) = ellipse.theta.float().filter(|theta| theta.abs() > FRAC_PI_2 + ROUNDING)
+            && let Some(theta) = ellipse.theta.float().filter(|theta| theta.abs() > PI + ROUNDING)
         {
             let text = format!(
-                "theta {} of allowedDeviationXY of node {id} is more than a quarter turn",
+                "theta {} of allowedDeviationXY of node {id} is more than a half turn",
                 number(theta)
             );
             found.remark("ORD-MSG-09", text);
