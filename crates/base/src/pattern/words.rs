@@ -41,7 +41,7 @@ impl Bound {
                 all.push(format!("{before} {}", self.noun(name)));
             }
             BoundKind::Count(_) | BoundKind::Includes(_) | BoundKind::Consecutive(_) => {
-                all.push(format!("{subject} has {}", self.noun(None)))
+                all.push(format!("{subject} has {}", self.noun(None)));
             }
             BoundKind::Present => all.push(format!("{subject} is there")),
             BoundKind::Absent => all.push(format!("{subject} is left out")),

@@ -148,7 +148,7 @@ fn widen(corners: &mut [Value]) {
 fn notch(corners: &mut Vec<Value>) {
     let at = |corner: &Value, axis: &str| corner[axis].as_f64().unwrap_or_default();
     if let [first, _, third, fourth] = corners.as_slice() {
-        let x = (at(third, "x") + at(fourth, "x")) / 2.0;
+        let x = f64::midpoint(at(third, "x"), at(fourth, "x"));
         let y = at(third, "y") - (at(third, "y") - at(first, "y")) / 4.0;
         corners.insert(3, json!({ "x": x, "y": y }));
     }
