@@ -163,7 +163,9 @@ records! {
     tolerance "enables-map-before-each-order" ["MAP-09"] "It sends enableMap for the map of the first node before every order, even if it is enabled."
         => happening(|site, vehicle, event| if let Event::Begins(running) = event {
             let map_id = running.stops[0].map_id.clone();
-            if let Some(version) = enabled_version(vehicle, &map_id) {
+            // A map has a name and a version.
+            let fits = site.most(vehicle, Measure::Parameters, "actions.actionsParameters") >= 2;
+            if let Some(version) = enabled_version(vehicle, &map_id).filter(|_| fits) {
                 site.map_action(vehicle, "enableMap", &map_id, &version);
                 site.send_instants(vehicle);
             }
