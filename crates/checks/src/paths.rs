@@ -366,7 +366,10 @@ struct OnEdges {
 impl Running for OnEdges {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
         if let Some(kinds) = navigation(record) {
-            self.free = !kinds.is_empty() && kinds.iter().all(|kind| *kind == "AUTONOMOUS");
+            self.free = !kinds.is_empty()
+                && kinds
+                    .iter()
+                    .all(|kind| matches!(*kind, "AUTONOMOUS" | "FREELY_NAVIGATING"));
         }
         self.curved.hear(record);
         if let Some(order) = record.order_to_vehicle() {

@@ -87,9 +87,7 @@ impl Exceptions {
     pub fn is_unfound(&self, fault: &str) -> bool {
         self.unfound.iter().any(|one| one.fault == fault)
     }
-}
 
-impl Exceptions {
     /// Whether a tolerance is one that is forbidden.
     #[must_use]
     pub fn is_forbidden(&self, tolerance: &str) -> bool {
