@@ -89,7 +89,8 @@ fn run_all(library: &Library, pack: &Pack, requests: &[VirtualRun]) -> Vec<RunRe
 
 fn with(library: &Library, pack: &Pack, tolerances: &[&str]) -> VirtualRun {
     let mut request = VirtualRun::of(library, pack);
-    for name in tolerances {
+    let exceptions = library.rules.suites.exceptions.of(Role::Agv, pack.version);
+    for name in tolerances.iter().filter(|name| !exceptions.is_forbidden(name)) {
         request.device.tolerate(name).unwrap();
     }
     request

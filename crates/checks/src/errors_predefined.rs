@@ -14,6 +14,8 @@ use tck_world::{Fact, Listen, Observation, Topic};
 
 /// How many errors of a state are looked at.
 const ERRORS: usize = 64;
+/// How many instant actions of a state are looked at.
+const ACTIONS: usize = 256;
 /// A list of so many errors may be full, and older ones give way.
 const MANY: usize = 12;
 
@@ -33,9 +35,16 @@ pub(super) const PREDEFINED: Check = Check {
 /// `errors/predefined-stay`.
 pub(super) const STAY: Check = Check {
     name: "errors/predefined-stay",
-    decides: &["ERR-09", "ORD-REJ-21", "ORD-REJ-24", "ORD-REJ-26"],
-    doc: "An error that the vocabulary lets stand until a new order or a mode is listed in every state until then: until another \
-          orderId or orderUpdateId is shown, or the mode takes orders. Not judged over a restart or a change at the vehicle, nor \
+    decides: &[
+        "ERR-09",
+        "ORD-REJ-21",
+        "ORD-REJ-22",
+        "ORD-REJ-24",
+        "ORD-REJ-26",
+        "IACT-10",
+    ],
+    doc: "An error that the vocabulary lets stand until a new order, a new instant action or a mode is listed in every state until \
+          then: until another orderId or orderUpdateId is shown, the list of instant actions is another one, or the mode takes orders. Not judged over a restart or a change at the vehicle, nor \
           beside a dozen of errors, of which the oldest may give way.",
     arguments: &[],
     listens: &[
@@ -120,6 +129,8 @@ struct Stay {
     standing: Vec<Standing>,
     /// The order of the last state.
     order: Option<(String, Option<u64>)>,
+    /// The instant actions of the last state.
+    instant_actions: Vec<String>,
 }
 
 fn references(error: &ErrorView) -> Vec<(String, String)> {
@@ -139,6 +150,8 @@ fn about(kind: &str) -> &'static str {
         "OUTDATED_ORDER_UPDATE" | "SAME_ORDER_UPDATE_ID" | "OTHER_ORDER_ACTIVE" => "ORD-REJ-21",
         "MOBILE_ROBOT_NOT_AVAILABLE" => "ORD-REJ-24",
         "START_NODE_OUT_OF_RANGE" => "ORD-REJ-26",
+        "NO_ROUTE_TO_TARGET" => "ORD-REJ-22",
+        "INVALID_INSTANT_ACTION" => "IACT-10",
         _ => "ERR-09",
     }
 }
@@ -170,6 +183,12 @@ impl Running for Stay {
             self.forget(&["new-order"]);
         }
         let first = self.order.replace(order).is_none();
+        let ids = state.instant_action_states.iter().take(ACTIONS);
+        let ids: Vec<String> = ids.map(|action| action.action_id.or_empty().to_owned()).collect();
+        if ids != self.instant_actions {
+            self.forget(&["new-instant-action"]);
+            self.instant_actions = ids;
+        }
         if matches!(
             state.operating_mode.text(),
             Some("AUTOMATIC" | "SEMIAUTOMATIC" | "INTERVENED")
@@ -200,7 +219,8 @@ impl Running for Stay {
         let before = std::mem::take(&mut self.standing);
         for (error, (kind, all)) in state.errors.iter().zip(listed) {
             let until = rule(context, error).and_then(|rule| rule.get("until")?.as_str());
-            let Some(until) = until.filter(|until| matches!(*until, "new-order" | "mode")) else {
+            let Some(until) = until.filter(|until| matches!(*until, "new-order" | "new-instant-action" | "mode"))
+            else {
                 continue;
             };
             let known = before

@@ -19,9 +19,9 @@ const CONNECTIONS: usize = 32;
 pub(super) const QUALITY: Check = Check {
     name: "mqtt/quality",
     decides: &["MQTT-06", "MQTT-07", "MQTT-08", "CONN-06", "FACT-01"],
-    doc: "order, instantActions, state, visualization and factsheet are published with QoS 0 (higher is harmless, a warning), connection \
-          with QoS 1 (2 is a warning); connection and factsheet with RETAIN, which only the tap can see here, order and \
-          instantActions without it (with it is a warning).",
+    doc: "order, instantActions, zoneSet, responses, state, visualization and factsheet are published with QoS 0 (higher is \
+          harmless, a warning), connection with QoS 1 (2 is a warning); connection and factsheet with RETAIN, which only the \
+          tap can see here, what a master control sends without it (with it is a warning).",
     arguments: &[],
     listens: &[Listen::AnyDelivered, Listen::AnyPublished],
     reads: &[],
@@ -64,7 +64,7 @@ impl Running for Quality {
         let (name, qos) = (message.name, message.qos);
         let text = format!("{name} is published with QoS {qos}");
         match (name, qos) {
-            ("order" | "instantActions", 1..) => findings.push(remark("MQTT-06", seq, text)),
+            ("order" | "instantActions" | "zoneSet" | "responses", 1..) => findings.push(remark("MQTT-06", seq, text)),
             ("state" | "visualization" | "factsheet", 1..) => findings.push(remark("MQTT-07", seq, text)),
             // To a subscriber the will looks like any message; its QoS is judged in the CONNECT packet.
             ("connection", 0)
@@ -75,7 +75,7 @@ impl Running for Quality {
             ("connection", 2..) => findings.push(remark("MQTT-08", seq, text)),
             _ => {}
         }
-        if message.retain == Some(true) && matches!(name, "order" | "instantActions") {
+        if message.retain == Some(true) && matches!(name, "order" | "instantActions" | "zoneSet" | "responses") {
             let text = format!("{name} is published with RETAIN: whoever subscribes later gets it, too");
             findings.push(remark("MQTT-06", seq, text));
         }

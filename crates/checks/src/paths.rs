@@ -1,4 +1,5 @@
-//! `state/paths-shared`, `state/paths` and `state/own-paths`: the paths that a freely navigating vehicle shares with its states.
+//! `state/paths-shared`, `state/paths`, `state/own-paths` and `state/edge-trajectories`: the paths that a vehicle shares with its
+//! states, and which of them are its own.
 //!
 //! The form of their members is left to `message/schema`.
 
@@ -7,7 +8,7 @@ use std::collections::VecDeque;
 use crate::finding::{broken, remark};
 use tck_base::nurbs::Flaw;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_view::{IntermediatePath, MessageView, PlannedPath, Spot, StateView, Velocity};
+use tck_view::{EdgeState, IntermediatePath, MessageView, PlannedPath, Spot, StateView, Velocity};
 use tck_world::ordered::curve;
 use tck_world::{Listen, Observation, Topic};
 
@@ -65,10 +66,57 @@ pub(super) const OWN: Check = Check {
     start: |_| Box::new(Own::default()),
 };
 
+/// `state/edge-trajectories`.
+pub(super) const ON_EDGES: Check = Check {
+    name: "state/edge-trajectories",
+    decides: &["STATE-MSG-21"],
+    doc: "A vehicle whose factsheet names free navigation only shows no trajectory in edgeStates of an order of which no edge was \
+          sent with one.",
+    arguments: &[],
+    listens: &[
+        Listen::Delivered(Topic::Factsheet),
+        Listen::ToVehicle(Topic::Order),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[],
+    needs: &[EdgeState::trajectory],
+    start: |_| Box::new(OnEdges::default()),
+};
+
+/// Orders that were sent with a trajectory.
+#[derive(Default)]
+struct Curved(VecDeque<String>);
+
+impl Curved {
+    fn hear(&mut self, record: &Observation<'_>) {
+        let Some(order) = record.order_to_vehicle() else { return };
+        let mut edges = order.edges.iter().take(POINTS);
+        if edges.any(|edge| edge.trajectory.presence().is_something()) {
+            if self.0.len() == ORDERS {
+                self.0.pop_front();
+            }
+            self.0.push_back(order.order_id.or_empty().to_owned());
+        }
+    }
+
+    fn has(&self, order: &str) -> bool {
+        self.0.iter().any(|curved| curved == order)
+    }
+}
+
+/// How a vehicle navigates, by its factsheet; nothing where this message is none.
+fn navigation<'r>(record: &Observation<'r>) -> Option<Vec<&'r str>> {
+    let sheet = record
+        .message()
+        .filter(|_| record.is_delivered(Topic::Factsheet))
+        .and_then(MessageView::factsheet);
+    let specification = sheet?.type_specification.there()?;
+    Some(specification.navigation_types.texts().collect())
+}
+
 #[derive(Default)]
 struct Shared {
-    /// Orders that were sent with a trajectory.
-    curved: VecDeque<String>,
+    curved: Curved,
     /// States in a row without a path.
     without: u32,
     told: bool,
@@ -76,20 +124,12 @@ struct Shared {
 
 impl Running for Shared {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        if let Some(order) = record.order_to_vehicle() {
-            let mut edges = order.edges.iter().take(POINTS);
-            if edges.any(|edge| edge.trajectory.presence().is_something()) {
-                if self.curved.len() == ORDERS {
-                    self.curved.pop_front();
-                }
-                self.curved.push_back(order.order_id.or_empty().to_owned());
-            }
-        }
+        self.curved.hear(record);
         let Some(state) = record.state() else { return false };
         let ahead = state.node_states.iter().any(|node| node.released.is(true));
         let commanded = matches!(state.operating_mode.text(), Some("AUTOMATIC" | "SEMIAUTOMATIC"));
         let order = state.order_id.or_empty();
-        if !(ahead && commanded && state.driving.is(true)) || self.curved.iter().any(|curved| curved == order) {
+        if !(ahead && commanded && state.driving.is(true)) || self.curved.has(order) {
             return false;
         }
         let lacks: Vec<&str> = [
@@ -297,13 +337,7 @@ struct Own {
 
 impl Running for Own {
     fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
-        if record.is_delivered(Topic::Factsheet) {
-            let sheet = record.message().and_then(MessageView::factsheet);
-            let specification = sheet.and_then(|sheet| sheet.type_specification.there());
-            let kinds: Vec<&str> = specification
-                .into_iter()
-                .flat_map(|specification| specification.navigation_types.texts())
-                .collect();
+        if let Some(kinds) = navigation(record) {
             self.on_lines = !kinds.is_empty() && kinds.iter().all(|kind| kind.ends_with("LINE_GUIDED"));
         }
         let Some(state) = record.state().filter(|_| self.on_lines) else {
@@ -316,5 +350,47 @@ impl Running for Own {
             findings.push(remark("PATH-09", record.seq(), text));
         }
         true
+    }
+}
+
+#[derive(Default)]
+struct OnEdges {
+    /// Whether the factsheet names free navigation, and no other.
+    free: bool,
+    curved: Curved,
+    /// The order that the harness has sent last.
+    sent: Option<String>,
+    told: bool,
+}
+
+impl Running for OnEdges {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        if let Some(kinds) = navigation(record) {
+            self.free = !kinds.is_empty()
+                && kinds
+                    .iter()
+                    .all(|kind| matches!(*kind, "AUTONOMOUS" | "FREELY_NAVIGATING"));
+        }
+        self.curved.hear(record);
+        if let Some(order) = record.order_to_vehicle() {
+            self.sent = Some(order.order_id.or_empty().to_owned());
+        }
+        let Some(state) = record.state().filter(|_| self.free) else {
+            return false;
+        };
+        let order = state.order_id.or_empty();
+        // Of an order that nobody has seen sent, it is not known what its edges have.
+        if self.sent.as_deref() != Some(order) || self.curved.has(order) || !state.edge_states.is_there() {
+            return false;
+        }
+        let mut edges = state.edge_states.iter().take(POINTS);
+        let own = edges.find(|edge| edge.trajectory.presence().is_something());
+        if let Some(edge) = own.filter(|_| !self.told) {
+            self.told = true;
+            let id = edge.edge_id.or_empty();
+            let text = format!("edge {id:?} has a trajectory in the state, and none was sent");
+            findings.push(broken("STATE-MSG-21", record.seq(), text));
+        }
+        !state.edge_states.elements().is_empty()
     }
 }

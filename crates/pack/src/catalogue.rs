@@ -384,9 +384,9 @@ mod tests {
                 .filter(|requirement| requirement.role == subject)
                 .count()
         };
-        assert_eq!(count(Subject::Agv), 467);
+        assert_eq!(count(Subject::Agv), 468);
         assert_eq!(count(Subject::MasterControl), 108);
-        assert_eq!(count(Subject::Both), 37);
+        assert_eq!(count(Subject::Both), 36);
         assert_eq!(count(Subject::Integrator), 10);
         assert_eq!(count(Subject::Broker), 1);
     }
@@ -509,7 +509,7 @@ mod tests {
                 _ => None,
             })
             .collect();
-        assert_eq!(reasons.len(), 8);
+        assert_eq!(reasons.len(), 18);
         assert!(reasons.iter().all(|reason| reason.len() > 20));
     }
 

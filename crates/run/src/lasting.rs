@@ -199,7 +199,7 @@ fn left_over(judge: &RunJudge, obstacles: &[Obstacle], idle: &Idle) -> Vec<Waive
     let open: Vec<&ActionState> = open_actions(&state).collect();
     let is_own = |action: &&ActionState| {
         let id = action.action_id.text();
-        !has_known_status(action) || id.is_some_and(|id| instant(judge, id).is_some())
+        !is_known_to_go_on(judge, action) || id.is_some_and(|id| instant(judge, id).is_some())
     };
     // What an order began may really be under way, as long as cancelOrder waits for it.
     if idle.answered || open.iter().all(is_own) {
@@ -264,7 +264,7 @@ fn unfinished(judge: &RunJudge, action: &ActionState) -> Vec<Waiver> {
     let status = action.action_status.text();
     let shown: String = status.unwrap_or("nothing").chars().take(40).collect();
     let about = ["IACT-04", "ORD-CANCEL-07", "ORD-CANCEL-13", "STATE-MSG-14", "ASTATE-05"];
-    if !has_known_status(action) {
+    if !is_known_to_go_on(judge, action) {
         return strange_status(names, status.unwrap_or_default());
     }
     let by_id = || object(names, [(ActionState::action_id, json!(id))]);
@@ -321,11 +321,13 @@ fn strange_status(names: &Names, shown: &str) -> Vec<Waiver> {
     all.map(|word| one(spelled(word), word, why.clone())).collect()
 }
 
-fn has_known_status(action: &ActionState) -> bool {
-    matches!(
-        action.action_status.text(),
-        Some("WAITING" | "INITIALIZING" | "RUNNING" | "PAUSED")
-    )
+/// Whether an action is said, in a word of the version, not to be over.
+fn is_known_to_go_on(judge: &RunJudge, action: &ActionState) -> bool {
+    match action.action_status.text() {
+        Some("WAITING" | "INITIALIZING" | "RUNNING" | "PAUSED") => true,
+        Some("RETRIABLE") => judge.ground().pack.has("retry"),
+        _ => false,
+    }
 }
 
 /// The type of an instant action the harness has sent, if it is one that needs nothing of the vehicle.
@@ -424,7 +426,7 @@ fn accepts_orders(judge: &RunJudge, kind: &str) -> bool {
 pub(super) fn has_ended(judge: &RunJudge, id: &str) -> bool {
     let mut states = judge.timeline().states_back().take(20);
     let known = states.find_map(|(_, state)| state.action(id).filter(|action| action.action_status.is_there()));
-    known.is_some_and(|action| !has_known_status(action))
+    known.is_some_and(|action| !is_known_to_go_on(judge, action))
 }
 
 /// What the journal says about a waiver.

@@ -1,5 +1,5 @@
-//! `suites/qualification/`: the clauses and monitors that no fault of the reference device can fail, and the faults
-//! that nothing finds. Each has its reason.
+//! `suites/qualification/`: the clauses and monitors that no fault of the reference device can fail, the faults that nothing
+//! finds, and the liberties of other versions that a version does not give. Each has its reason.
 //!
 //! Qualification holds the lists both ways: what is unproven stands in them, and what stands in them is unproven.
 
@@ -41,6 +41,19 @@ pub struct Unfound {
     pub why: String,
 }
 
+/// A liberty of other versions that a version forbids.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Forbidden {
+    /// The side whose reference device has it.
+    pub role: Role,
+    /// The versions that forbid it; all unless said.
+    pub spec: Option<VersionRange>,
+    /// Name of the tolerance.
+    pub tolerance: String,
+    /// Which requirement forbids it.
+    pub why: String,
+}
+
 /// All exceptions of the suites.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Exceptions {
@@ -48,6 +61,8 @@ pub struct Exceptions {
     pub unproven: Vec<Unproven>,
     /// What nothing finds.
     pub unfound: Vec<Unfound>,
+    /// What a version forbids.
+    pub forbidden: Vec<Forbidden>,
 }
 
 impl Exceptions {
@@ -59,9 +74,11 @@ impl Exceptions {
         };
         let unproven = self.unproven.iter().filter(|one| holds(one.role, &one.spec));
         let unfound = self.unfound.iter().filter(|one| holds(one.role, &one.spec));
+        let forbidden = self.forbidden.iter().filter(|one| holds(one.role, &one.spec));
         Self {
             unproven: unproven.cloned().collect(),
             unfound: unfound.cloned().collect(),
+            forbidden: forbidden.cloned().collect(),
         }
     }
 
@@ -69,6 +86,12 @@ impl Exceptions {
     #[must_use]
     pub fn is_unfound(&self, fault: &str) -> bool {
         self.unfound.iter().any(|one| one.fault == fault)
+    }
+
+    /// Whether a tolerance is one that is forbidden.
+    #[must_use]
+    pub fn is_forbidden(&self, tolerance: &str) -> bool {
+        self.forbidden.iter().any(|one| one.tolerance == tolerance)
     }
 }
 
@@ -85,33 +108,48 @@ pub(super) fn read(
     let Some(fields) = Fields::of(&root, problems) else {
         return Exceptions::default();
     };
-    fields.only(&[&["unproven", "unfound"]], problems);
+    fields.only(&[&["unproven", "unfound", "forbidden"]], problems);
     fields.need("unproven", &start(&root), problems);
     Exceptions {
         unproven: unproven(&fields, role, vocabulary, problems),
-        unfound: unfound(&fields, role, problems),
+        unfound: reasoned(&fields, ["unfound", "fault"], problems, |fault, spec, why| Unfound {
+            role,
+            spec,
+            fault,
+            why,
+        }),
+        forbidden: reasoned(&fields, ["forbidden", "tolerance"], problems, |tolerance, spec, why| {
+            Forbidden {
+                role,
+                spec,
+                tolerance,
+                why,
+            }
+        }),
     }
 }
 
-fn unfound(fields: &Fields<'_>, role: Role, problems: &mut Problems) -> Vec<Unfound> {
+/// A list of names, each with the versions it stands for and a reason.
+fn reasoned<T>(
+    fields: &Fields<'_>,
+    [list, member]: [&'static str; 2],
+    problems: &mut Problems,
+    make: impl Fn(String, Option<VersionRange>, String) -> T,
+) -> Vec<T> {
     let mut all = Vec::new();
-    for node in fields.list("unfound", problems) {
+    for node in fields.list(list, problems) {
         let Some(fields) = Fields::of(node, problems) else {
             continue;
         };
-        fields.only(&[&["fault", "spec", "why"]], problems);
-        let fault = fields.need_text("fault", &node.span, problems);
+        fields.only(&[&[member, "spec", "why"]], problems);
+        let name = fields.need_text(member, &node.span, problems);
         let why = fields.need_text("why", &node.span, problems);
-        let (Some(fault), Some(why)) = (fault, why) else {
+        let (Some(name), Some(why)) = (name, why) else {
             continue;
         };
         let spec = fields.get("spec", problems);
-        all.push(Unfound {
-            role,
-            spec: spec.and_then(|node| version_range(node, problems)),
-            fault: fault.to_owned(),
-            why: why.to_owned(),
-        });
+        let spec = spec.and_then(|node| version_range(node, problems));
+        all.push(make(name.to_owned(), spec, why.to_owned()));
     }
     all
 }

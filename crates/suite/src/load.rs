@@ -95,6 +95,7 @@ pub(super) fn load<'a>(
         let read = exceptions::read(source, *role, vocabulary, &mut problems);
         suites.exceptions.unproven.extend(read.unproven);
         suites.exceptions.unfound.extend(read.unfound);
+        suites.exceptions.forbidden.extend(read.forbidden);
     }
     suites.tests.sort_by(|left, right| left.id.cmp(&right.id));
     suites.monitors.sort_by(|left, right| left.id.cmp(&right.id));

@@ -71,7 +71,9 @@ impl<'n> Speller<'n> {
             PatternKind::List(parts) | PatternKind::All(parts) => all(parts),
             PatternKind::Elements(elements) => self.is_the_same(&elements.pattern, place),
             PatternKind::Not(inner) => self.is_the_same(inner, place),
-            PatternKind::Equals(term) | PatternKind::Includes(term) => is_term_the_same(term, place),
+            PatternKind::Equals(term) | PatternKind::Includes(term) | PatternKind::Consecutive(term) => {
+                is_term_the_same(term, place)
+            }
             PatternKind::In(terms) => terms.iter().all(|term| is_term_the_same(term, place)),
             _ => true,
         }
@@ -93,6 +95,7 @@ impl<'n> Speller<'n> {
             PatternKind::Not(inner) => PatternKind::Not(Box::new(self.pattern(inner, place))),
             PatternKind::Equals(term) => PatternKind::Equals(self.term(term, place)),
             PatternKind::Includes(term) => PatternKind::Includes(self.term(term, place)),
+            PatternKind::Consecutive(term) => PatternKind::Consecutive(self.term(term, place)),
             PatternKind::In(terms) => PatternKind::In(terms.iter().map(|term| self.term(term, place)).collect()),
             other => other.clone(),
         };

@@ -10,7 +10,7 @@ use tck_base::pattern::{
 use tck_base::yaml::{Kind, Node};
 
 /// Every operator of a pattern.
-pub(super) const OPERATORS: [&str; 18] = [
+pub(super) const OPERATORS: [&str; 19] = [
     "$has",
     "$hasNew",
     "$none",
@@ -18,6 +18,7 @@ pub(super) const OPERATORS: [&str; 18] = [
     "$atMostOne",
     "$each",
     "$includes",
+    "$consecutive",
     "$empty",
     "$count",
     "$in",
@@ -195,12 +196,15 @@ fn operator(key: &Node, value: &Node, problems: &mut Problems) -> Option<Pattern
         "$one" => elements(Element::One, problems)?,
         "$atMostOne" => elements(Element::AtMostOne, problems)?,
         "$each" => elements(Element::Each, problems)?,
-        "$includes" => {
+        "$includes" | "$consecutive" => {
             let list = term(value, problems);
             if !matches!(list.kind, TermKind::List(_) | TermKind::Variable(_)) {
                 return bad_operand(name, value, "a list, or a variable that holds one", problems);
             }
-            PatternKind::Includes(list)
+            match name {
+                "$includes" => PatternKind::Includes(list),
+                _ => PatternKind::Consecutive(list),
+            }
         }
         "$empty" => PatternKind::Empty(truth(name, value, problems)?),
         "$count" => PatternKind::Count(Box::new(pattern(value, problems)?)),

@@ -54,13 +54,37 @@ pub enum Deviation {
 }
 
 impl Deviation {
-    /// The radius, where it is one.
+    /// Metres by which a vehicle may be off in the direction in which it may be off most: the radius, or the long half axis.
     #[must_use]
-    pub const fn radius(&self) -> Option<f64> {
+    pub fn farthest(&self) -> Option<f64> {
         match self {
             Self::Radius(radius) => Some(radius.float()),
-            Self::Ellipse(_) => None,
+            Self::Ellipse(ellipse) => Some(ellipse.a.float()?.max(ellipse.b.float()?)),
         }
+    }
+
+    /// Metres by which a vehicle may be off in whatever direction: the radius, or the short half axis.
+    #[must_use]
+    pub fn nearest(&self) -> Option<f64> {
+        match self {
+            Self::Radius(radius) => Some(radius.float()),
+            Self::Ellipse(ellipse) => Some(ellipse.a.float()?.min(ellipse.b.float()?)),
+        }
+    }
+
+    /// Whether a vehicle may be off by so much along x and y, with a margin, in metres.
+    #[must_use]
+    pub fn allows(&self, (x, y): (f64, f64), margin: f64) -> bool {
+        let (a, b, theta) = match self {
+            Self::Radius(radius) => (radius.float(), radius.float(), 0.0),
+            Self::Ellipse(ellipse) => (
+                ellipse.a.float().unwrap_or_default(),
+                ellipse.b.float().unwrap_or_default(),
+                ellipse.theta.float().unwrap_or_default(),
+            ),
+        };
+        let (along, across) = (x * theta.cos() + y * theta.sin(), y * theta.cos() - x * theta.sin());
+        (along / (a.max(0.0) + margin)).hypot(across / (b.max(0.0) + margin)) <= 1.0
     }
 }
 

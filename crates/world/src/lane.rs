@@ -84,7 +84,9 @@ impl OrderedPlace {
             x: sane(&position.x)?,
             y: sane(&position.y)?,
             theta: sane(&position.theta),
-            deviation: deviation.and_then(Deviation::radius).filter(|radius| is_sane(*radius)),
+            deviation: deviation
+                .and_then(Deviation::farthest)
+                .filter(|radius| is_sane(*radius)),
             deviation_theta: sane(&position.allowed_deviation_theta),
         })
     }
@@ -114,7 +116,8 @@ pub struct Demands {
     pub orientation: Option<f64>,
     /// Whether the orientation is against the map.
     pub global: bool,
-    /// rotationAllowed.
+    /// Whether the vehicle may turn on it: rotationAllowed, or that reachOrientationBeforeEntering does not ask for the turn
+    /// before it.
     pub rotation_allowed: Option<bool>,
     /// Whether the way may be no straight line.
     pub curved: bool,
@@ -155,6 +158,8 @@ impl Demands {
     pub fn read(edge: &Edge) -> Option<Self> {
         let kind = edge.orientation_type.or_empty();
         let curve = curve(&edge.trajectory);
+        let before = edge.reach_orientation_before_entering.flag();
+        let before = before.filter(|_| !edge.orientation.is_absent());
         Some(Self {
             sequence: edge.sequence_id.whole()?,
             max_speed: sane(&edge.max_speed).filter(|speed| *speed > 0.0),
@@ -162,7 +167,7 @@ impl Demands {
             // What another word than these asks for is not known.
             orientation: sane(&edge.orientation).filter(|_| matches!(kind, "" | "GLOBAL" | "TANGENTIAL")),
             global: kind == "GLOBAL",
-            rotation_allowed: edge.rotation_allowed.flag(),
+            rotation_allowed: edge.rotation_allowed.flag().or(before.map(|before| !before)),
             curved: curve.is_some(),
             path: curve.and_then(|(curve, _)| curve).map(|curve| curve.path()),
             corridor: edge.corridor.there().and_then(|corridor| Corridor::read(corridor)),

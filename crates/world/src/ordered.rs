@@ -1,7 +1,7 @@
 //! Nodes and edges of an order as checks go through them, bounded.
 
 use tck_base::nurbs::{Curve, Flaw, Written, WrittenPoint};
-use tck_view::{ControlPoint, Edge, Element, List, Member, Node, Number, OrderView, Text, Trajectory};
+use tck_view::{ControlPoint, Deviation, Edge, Element, List, Member, Node, Number, OrderView, Text, Trajectory};
 
 /// How many elements of one list are looked at.
 pub const ELEMENTS: usize = 2048;
@@ -39,10 +39,16 @@ pub fn place_of(node: &Node) -> Option<(f64, f64, &str)> {
     Some((position.x.float()?, position.y.float()?, position.map_id.or_empty()))
 }
 
-/// The radius in which a vehicle has reached a node.
+/// How far off a vehicle may be where it has reached a node.
+#[must_use]
+pub fn allowed(node: &Node) -> Option<&Deviation> {
+    node.node_position.there()?.allowed_deviation_xy.there()
+}
+
+/// Metres by which a vehicle may be off at most where it has reached a node.
 #[must_use]
 pub fn allowed_deviation(node: &Node) -> Option<f64> {
-    node.node_position.there()?.allowed_deviation_xy.there()?.radius()
+    allowed(node)?.farthest()
 }
 
 /// A short copy of a text; `None` when it is missing or no text.

@@ -22,6 +22,8 @@ const ZONES: usize = 256;
 /// A zone as it was sent.
 #[derive(Clone, Debug)]
 pub struct KnownZone {
+    /// zoneSetId.
+    pub set: String,
     /// The zone.
     pub zone: Zone,
     /// Where it is.
@@ -29,11 +31,12 @@ pub struct KnownZone {
 }
 
 impl KnownZone {
-    fn read(zone: &Zone) -> Option<Self> {
+    fn read(set: &str, zone: &Zone) -> Option<Self> {
         let corners = zone.vertices.iter();
         let corners = corners.map(|corner| Some(Point::new(corner.x.float()?, corner.y.float()?)));
         let area = Polygon::new(corners.collect::<Option<Vec<_>>>()?).ok()?;
         Some(Self {
+            set: set.to_owned(),
             zone: zone.clone(),
             area,
         })
@@ -96,6 +99,13 @@ impl ZonesSeen {
         here.flat_map(|set| &set.zones)
     }
 
+    /// The zones of a set, in force or not, where it is known what is in it.
+    #[must_use]
+    pub fn of_set(&self, id: &str) -> Option<&[KnownZone]> {
+        let set = self.sets.get(id).filter(|set| !set.doubtful)?;
+        Some(&set.zones)
+    }
+
     /// Where the vehicle is, and where it was in the message before.
     #[must_use]
     pub fn places(&self) -> (Option<&Place>, Option<&Place>) {
@@ -147,7 +157,12 @@ impl ZonesSeen {
         let (Some(id), Some(map_id)) = (set.zone_set_id.text(), set.map_id.text()) else {
             return;
         };
-        let zones: Option<Vec<KnownZone>> = set.zones.iter().take(ZONES).map(KnownZone::read).collect();
+        let zones: Option<Vec<KnownZone>> = set
+            .zones
+            .iter()
+            .take(ZONES)
+            .map(|zone| KnownZone::read(id, zone))
+            .collect();
         let new = Known {
             map_id: map_id.to_owned(),
             doubtful: zones.is_none(),

@@ -63,6 +63,8 @@ pub enum PatternKind {
     Elements(Elements),
     /// `$includes`: every element of this list matches some element.
     Includes(Term),
+    /// `$consecutive`: the elements of this list match elements that follow one another directly.
+    Consecutive(Term),
     /// `$empty: true` or `false`.
     Empty(bool),
     /// `$count`: the number of elements matches.
@@ -133,7 +135,7 @@ impl Pattern {
     /// Calls `visit` with every term of this pattern.
     pub fn visit_terms<'a>(&'a self, visit: &mut dyn FnMut(&'a Term)) {
         match &self.kind {
-            PatternKind::Equals(term) | PatternKind::Includes(term) => visit(term),
+            PatternKind::Equals(term) | PatternKind::Includes(term) | PatternKind::Consecutive(term) => visit(term),
             PatternKind::Object(members) => members.iter().for_each(|(_, member)| member.visit_terms(visit)),
             PatternKind::List(parts) | PatternKind::All(parts) => parts.iter().for_each(|part| part.visit_terms(visit)),
             PatternKind::Elements(elements) => elements.pattern.visit_terms(visit),

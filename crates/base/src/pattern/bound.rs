@@ -25,7 +25,8 @@ pub(super) enum BoundKind {
     All(Vec<Bound>),
     Elements(Element, Box<Bound>),
     Includes(Vec<Bound>),
-    /// `$includes`, or a comparison, of a variable that turned out not to be a list or a number: matches nothing.
+    Consecutive(Vec<Bound>),
+    /// `$includes`, `$consecutive`, or a comparison, of a variable that turned out not to be a list or a number: matches nothing.
     Unfit {
         wanted: &'static str,
         value: Value,
@@ -84,9 +85,13 @@ impl Pattern {
             PatternKind::Elements(elements) => {
                 BoundKind::Elements(elements.which, Box::new(elements.pattern.bind(bindings)?))
             }
-            PatternKind::Includes(term) => match term.bind(bindings)? {
+            PatternKind::Includes(term) | PatternKind::Consecutive(term) => match term.bind(bindings)? {
                 Value::Array(items) => {
-                    BoundKind::Includes(items.iter().map(|item| Bound::picture(item, &term.span)).collect())
+                    let items = items.iter().map(|item| Bound::picture(item, &term.span)).collect();
+                    match &self.kind {
+                        PatternKind::Includes(_) => BoundKind::Includes(items),
+                        _ => BoundKind::Consecutive(items),
+                    }
                 }
                 value => BoundKind::Unfit {
                     wanted: "a list",

@@ -86,7 +86,7 @@ impl Bound {
             BoundKind::Elements(Element::Has | Element::One | Element::Each, inner) => inner.leaves(),
             // One more, for being new.
             BoundKind::Elements(Element::HasNew, inner) => inner.leaves() + 1,
-            BoundKind::Includes(items) => items.len().max(1),
+            BoundKind::Includes(items) | BoundKind::Consecutive(items) => items.len().max(1),
             _ => 1,
         }
     }

@@ -184,6 +184,15 @@ impl Bound {
             BoundKind::Includes(items) => value
                 .and_then(Value::as_array)
                 .is_some_and(|found| first_not_included(items, found, baseline).is_none()),
+            BoundKind::Consecutive(items) => value.and_then(Value::as_array).is_some_and(|found| {
+                let fits = |run: &[Value]| {
+                    items
+                        .iter()
+                        .zip(run)
+                        .all(|(item, one)| item.accepts(Some(one), baseline))
+                };
+                items.is_empty() || found.windows(items.len()).any(fits)
+            }),
             BoundKind::Unfit { .. } => false,
             BoundKind::Empty(empty) => value
                 .and_then(Value::as_array)

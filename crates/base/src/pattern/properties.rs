@@ -61,6 +61,7 @@ fn operator(name: &str, value: &Value) -> Pattern {
         "$atMostOne" => elements(Element::AtMostOne),
         "$each" => elements(Element::Each),
         "$includes" => PatternKind::Includes(term(value.clone())),
+        "$consecutive" => PatternKind::Consecutive(term(value.clone())),
         "$empty" => PatternKind::Empty(value == &json!(true)),
         "$count" => PatternKind::Count(Box::new(pattern(value))),
         "$in" => PatternKind::In(value.as_array().into_iter().flatten().cloned().map(term).collect()),
@@ -140,6 +141,11 @@ fn quantifiers_count_matching_elements() {
     holds(json!({"e": {"$includes": [{"t": "y"}, {"l": 2}]}}), two.clone());
     fails(json!({"e": {"$includes": [{"t": "y"}, {"l": 3}]}}), two.clone());
     holds(json!({"e": {"$includes": []}}), json!({"e": []}));
+    let way = json!({"n": [{"i": "a"}, {"i": "b"}, {"i": "c"}]});
+    holds(json!({"n": {"$consecutive": [{"i": "b"}, {"i": "c"}]}}), way.clone());
+    fails(json!({"n": {"$consecutive": [{"i": "a"}, {"i": "c"}]}}), way.clone());
+    fails(json!({"n": {"$consecutive": [{"i": "c"}, {"i": "b"}]}}), way.clone());
+    fails(json!({"n": {"$consecutive": [{"i": "a"}]}}), json!({"n": []}));
     holds(json!({"e": {"$empty": false}}), two.clone());
     holds(json!({"e": {"$empty": true}}), json!({"e": []}));
     fails(json!({"e": {"$empty": true}}), two.clone());
@@ -326,6 +332,7 @@ fn any_pattern() -> impl Strategy<Value = Value> {
         (0..3).prop_map(|n| json!({"$count": n})),
         prop::collection::vec(any_json(), 0..3).prop_map(|items| json!({"$in": items})),
         prop::collection::vec(any_json(), 0..3).prop_map(|items| json!({"$includes": items})),
+        prop::collection::vec(any_json(), 0..3).prop_map(|items| json!({"$consecutive": items})),
         any_json().prop_map(|value| json!({"$includes": value})),
     ];
     leaf.prop_recursive(4, 30, 4, |inner| {

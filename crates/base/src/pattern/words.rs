@@ -40,7 +40,9 @@ impl Bound {
                 };
                 all.push(format!("{before} {}", self.noun(name)));
             }
-            BoundKind::Count(_) | BoundKind::Includes(_) => all.push(format!("{subject} has {}", self.noun(None))),
+            BoundKind::Count(_) | BoundKind::Includes(_) | BoundKind::Consecutive(_) => {
+                all.push(format!("{subject} has {}", self.noun(None)));
+            }
             BoundKind::Present => all.push(format!("{subject} is there")),
             BoundKind::Absent => all.push(format!("{subject} is left out")),
             _ => all.push(format!("{subject} is {}", self.noun(None))),
@@ -72,10 +74,14 @@ impl Bound {
                 };
                 format!("{quantity}{}", inner.relative(*which == Element::Each))
             }
-            BoundKind::Includes(items) if items.is_empty() => "a list".to_owned(),
+            BoundKind::Includes(items) | BoundKind::Consecutive(items) if items.is_empty() => "a list".to_owned(),
             BoundKind::Includes(items) => {
                 let items: Vec<String> = items.iter().map(|item| item.element(member)).collect();
                 listed(&items, "and")
+            }
+            BoundKind::Consecutive(items) => {
+                let items: Vec<String> = items.iter().map(|item| item.element(member)).collect();
+                items.join(", directly followed by ")
             }
             BoundKind::Unfit { wanted, value } => format!("{wanted}, which the test does not have: {value}"),
             BoundKind::Empty(true) => "an empty list".to_owned(),

@@ -6,7 +6,7 @@ use super::{Command, Found};
 use crate::finding::quote;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_view::ActionView;
-use tck_world::{Listen, Observation, Topic};
+use tck_world::{Listen, Observation, Topic, sets_position};
 
 /// Kinds of instant actions that must not come, whatever the array they come in is called.
 pub(crate) const NOT_ASKED: Check = Check {
@@ -41,7 +41,8 @@ struct NotAsked {
 
 impl NotAsked {
     fn forbids(&self, kind: &str) -> bool {
-        let named = |list: &Vec<String>| list.iter().any(|one| one == kind);
+        let same = |one: &String| one == kind || (sets_position(one) && sets_position(kind));
+        let named = |list: &Vec<String>| list.iter().any(same);
         match (&self.types, &self.except) {
             (Some(types), _) if !named(types) => false,
             (_, Some(except)) => !named(except),

@@ -4,11 +4,11 @@ use std::borrow::Cow;
 
 use serde_json::Value;
 
-use super::{Command, Found, allowed_deviation, edges_in_sequence, nodes_in_sequence, place_of};
+use super::{Command, Found, allowed, edges_in_sequence, nodes_in_sequence, place_of};
 use crate::finding::{missing_or, quote, show};
 use tck_base::nurbs::Path;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_view::{Corridor, Edge, Member, Node};
+use tck_view::{Corridor, Deviation, Edge, Member, Node};
 use tck_world::ordered::curve;
 use tck_world::{Fact, Listen, Observation, Topic};
 
@@ -140,7 +140,7 @@ fn by_itself(corridor: &Corridor, edge: &Edge, context: &CheckContext<'_>, found
 
 /// The first node, behind no other corridor: where the vehicle may be on it, it is inside the corridor that begins there.
 fn beginning(edge: &Edge, node: &Node, found: &mut Found<'_>) {
-    let allowed = allowed_deviation(node);
+    let allowed = allowed(node).and_then(Deviation::nearest);
     let (Some((left, right)), Some(allowed)) = (widths(edge), allowed) else {
         return;
     };
@@ -185,7 +185,7 @@ fn meeting(pair: &[&Edge], around: &[&Node], found: &mut Found<'_>) {
         found.remark("CORR-04", text);
         return;
     }
-    let allowed = allowed_deviation(node);
+    let allowed = allowed(node).and_then(Deviation::nearest);
     let reach = before_left.max(before_right);
     let wide = |allowed: f64| allowed.min(reach) > left.max(right) + ROUNDING || allowed > left + right + ROUNDING;
     if let Some(allowed) = allowed.filter(|allowed| wide(*allowed)) {

@@ -31,7 +31,8 @@ pub(crate) const POSITION_RANGE: Check = Check {
     name: "commands/position-range",
     decides: &["ORD-MSG-09", "MAP-02"],
     doc: "theta of a node lies between minus pi and pi, allowedDeviationXY is not below 0, allowedDeviationTheta lies \
-          between 0 and pi. An ellipse whose a is less than its b is a warning. Coordinates that are far too big for metres are a warning.",
+          between 0 and pi. An ellipse whose a is less than its b, or whose theta is more than a half turn, is a warning. Coordinates \
+          that are far too big for metres are a warning.",
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[],
@@ -139,7 +140,7 @@ fn position_range(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<
         if let Some(allowed) = position
             .allowed_deviation_xy
             .there()
-            .and_then(Deviation::radius)
+            .and_then(Deviation::nearest)
             .filter(|allowed| *allowed < 0.0)
         {
             found.broken(
@@ -155,6 +156,15 @@ fn position_range(command: Command<'_>, _: &CheckContext<'_>, found: &mut Found<
                 "a {} of allowedDeviationXY of node {id} is less than b {}",
                 number(a),
                 number(b)
+            );
+            found.remark("ORD-MSG-09", text);
+        }
+        if let Some(Deviation::Ellipse(ellipse)) = position.allowed_deviation_xy.there()
+            && let Some(theta) = ellipse.theta.float().filter(|theta| theta.abs() > PI + ROUNDING)
+        {
+            let text = format!(
+                "theta {} of allowedDeviationXY of node {id} is more than a half turn",
+                number(theta)
             );
             found.remark("ORD-MSG-09", text);
         }

@@ -68,7 +68,7 @@ use tck_check::{CheckContext, CheckFinding, Running};
 use tck_view::{ActionView, Element, InstantActionsView, OrderView, Scope};
 use tck_world::Observation;
 use tck_world::ordered::{
-    ELEMENTS, allowed_deviation, edges_in_sequence, elements, nodes_in_sequence, place_of, short,
+    ELEMENTS, allowed, allowed_deviation, edges_in_sequence, elements, nodes_in_sequence, place_of, short,
 };
 
 /// How many findings of one kind a message is worth.

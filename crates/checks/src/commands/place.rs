@@ -2,10 +2,10 @@
 
 use serde_json::Value;
 
-use super::{Command, Found, allowed_deviation, nodes_in_sequence, place_of};
+use super::{Command, Found, allowed, nodes_in_sequence, place_of};
 use crate::finding::quote;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_view::{Member, Node, OrderView, StateView};
+use tck_view::{Deviation, Member, Node, OrderView, StateView};
 use tck_world::{Fact, Factsheet, Listen, Observation, ShownState, Topic};
 
 /// `commands/start`.
@@ -240,10 +240,13 @@ fn covers(node: &Node, seen: &ShownState, exact: bool) -> Reach {
     let (Some((x, y, map)), Some((at_x, at_y, on))) = (place_of(node), seen.pose.as_ref()) else {
         return Reach::Unknown;
     };
-    let allowed = allowed_deviation(node);
-    let named = allowed.is_some_and(|allowed| allowed > 0.0);
+    let allowed = allowed(node);
+    let named = allowed
+        .and_then(Deviation::farthest)
+        .is_some_and(|allowed| allowed > 0.0);
     let margin = if exact && named { ROUNDED } else { MEASURED };
-    let near = (x - at_x).hypot(y - at_y) <= allowed.unwrap_or_default().max(0.0) + margin;
+    let (dx, dy) = (at_x - x, at_y - y);
+    let near = allowed.map_or(dx.hypot(dy) <= margin, |allowed| allowed.allows((dx, dy), margin));
     if near && (map == on || on.is_empty()) {
         Reach::Yes
     } else {

@@ -118,7 +118,7 @@ impl Running for Responses {
                         "a grant comes under {}, while what is granted has another id",
                         quote(&id)
                     );
-                    found.broken("REQ-11", text);
+                    found.remark("REQ-11", text);
                 } else {
                     found.remark("REQ-18", format!("nobody has asked with the id {}", quote(&id)));
                 }
@@ -264,7 +264,7 @@ mod tests {
         let mut trace = Trace::master_control_of("3.0");
         trace.shows(&asks("r1", "GRANTED")).wait(1.0);
         trace.commands("responses", &lease("r2", "2026-01-01T12:30:00.000Z"));
-        assert_eq!(trace.judge("commands/responses").summary(), ["REQ-11"]);
+        assert_eq!(trace.judge("commands/responses").summary(), ["REQ-11 warning"]);
         let mut trace = Trace::master_control_of("3.0");
         trace.shows(&asks("r1", "REQUESTED")).wait(1.0);
         let both = json!({ "responses": [

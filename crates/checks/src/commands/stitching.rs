@@ -90,7 +90,7 @@ fn moved(old: &NodePosition, new: &NodePosition) -> [(Field, Change); 6] {
         (NodePosition::theta, Change::of(&old.theta, &new.theta, float)),
         (
             NodePosition::allowed_deviation_xy,
-            Change::of(xy, &new.allowed_deviation_xy, Deviation::radius),
+            Change::of(xy, &new.allowed_deviation_xy, Deviation::farthest),
         ),
         (
             NodePosition::allowed_deviation_theta,

@@ -9,7 +9,14 @@ use tck_world::{Fact, Listen, Observation, Topic, View, apart};
 /// `motion/node-theta`.
 pub(crate) const NODE_THETA: Check = Check {
     name: "motion/node-theta",
-    decides: &["ORD-MSG-14", "ORD-MSG-10", "ORD-MSG-11", "NODE-01", "OPT-01"],
+    decides: &[
+        "ORD-MSG-14",
+        "ORD-MSG-10",
+        "ORD-MSG-11",
+        "ORD-MSG-33",
+        "NODE-01",
+        "OPT-01",
+    ],
     doc: "When a node with theta is reported traversed, the vehicle has that orientation within allowedDeviationTheta, \
           or within 0.1 rad where that is absent or 0. A small excess is a warning, more than 0.35 rad is not. Judged \
           by the first state that shows the node, with a margin for what the vehicle may have turned since the state \

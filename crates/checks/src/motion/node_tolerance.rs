@@ -8,20 +8,21 @@ use tck_world::{Fact, Listen, Observation, Topic, View};
 /// `motion/node-tolerance`.
 pub(crate) const NODE_TOLERANCE: Check = Check {
     name: "motion/node-tolerance",
-    decides: &["NODE-01", "ORD-MSG-13"],
+    decides: &["NODE-01", "ORD-MSG-13", "ORD-MSG-32"],
     doc: "When a node with allowedDeviationXY is reported traversed, the reported position is within it; with 0, within \
-          the usual tolerance of the vendor, 0.1 m unless `tolerance` says otherwise. Judged by the first state that \
+          the usual tolerance of the vendor, 0.1 m unless `tolerance` says otherwise. Where it is left out, `absent` is what is meant. Judged by the first state that \
           shows the node: with a margin for the way since the state before, but at the end of the base only for 0.2 s of \
           late reports. Not judged on nodes with actions, which may move the \
           vehicle. Always a warning.",
-    arguments: &["tolerance"],
+    arguments: &["tolerance", "absent"],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
     needs: &[Node::node_position, StateView::position],
     start: |context| {
-        let stated = context.with.get("tolerance").and_then(serde_json::Value::as_f64);
+        let stated = |name| context.with.get(name).and_then(serde_json::Value::as_f64);
         Box::new(NodeTolerance {
-            usual: stated.unwrap_or(0.1),
+            usual: stated("tolerance").unwrap_or(0.1),
+            absent: stated("absent"),
         })
     },
 };
@@ -34,6 +35,8 @@ const LATE: f64 = 0.2;
 struct NodeTolerance {
     /// Tolerance of the vendor, in metres.
     usual: f64,
+    /// What a node without allowedDeviationXY allows, in metres; not judged unless said.
+    absent: Option<f64>,
 }
 
 /// How far the vehicle may have come between passing the node and this state; `None` when nobody can know.
@@ -77,7 +80,7 @@ impl Running for NodeTolerance {
         else {
             return false;
         };
-        let Some(allowed) = place.deviation.filter(|_| pose.map_id == place.map) else {
+        let Some(allowed) = place.deviation.or(self.absent).filter(|_| pose.map_id == place.map) else {
             return false;
         };
         let limit = allowed.max(self.usual) + SLACK;

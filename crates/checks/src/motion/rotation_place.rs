@@ -1,21 +1,21 @@
-//! `motion/rotation-place`: no turning on an edge that forbids rotation.
+//! `motion/rotation-place`: no turning on an edge that forbids rotation, or wants it done before.
 
 use super::{TURNED, found};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_view::{Edge, StateView};
+use tck_view::StateView;
 use tck_world::{Fact, Listen, Observation, Topic, View, apart};
 
 /// `motion/rotation-place`.
 pub(crate) const ROTATION_PLACE: Check = Check {
     name: "motion/rotation-place",
     decides: &["ORD-MSG-24", "ORD-MSG-12", "ORD-MSG-11"],
-    doc: "On a straight edge with rotationAllowed false, theta stays what it was, and where the edge asks for an \
+    doc: "On a straight edge with rotationAllowed false, or with reachOrientationBeforeEntering true and an orientation, theta stays what it was, and where the edge asks for an \
           orientation, it is that from the start: the vehicle turns on the nodes. Judged on the line between the nodes \
           and away from both, with 0.35 rad for what following a line needs.",
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Way],
-    needs: &[Edge::rotation_allowed, StateView::position],
+    needs: &[StateView::position],
     start: |_| Box::new(RotationPlace::default()),
 };
 

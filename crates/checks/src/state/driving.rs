@@ -239,7 +239,7 @@ impl PositionMoves {
             let Some(id) = node.node_id.text().filter(|id| !id.is_empty()) else {
                 continue;
             };
-            let range = position.allowed_deviation_xy.there().and_then(Deviation::radius);
+            let range = position.allowed_deviation_xy.there().and_then(Deviation::farthest);
             // Who is counted as on a node from afar need not come to it.
             if range.is_some_and(|range| range > APART) {
                 self.nodes.remove(id);

@@ -12,6 +12,8 @@ pub(super) mod map_changes;
 pub(super) mod maps;
 pub(super) mod node_positions;
 pub(super) mod order;
+pub(super) mod order_cleared;
+pub(super) mod pause_allowed;
 pub(super) mod pause_stands;
 pub(super) mod paused;
 pub(super) mod period;

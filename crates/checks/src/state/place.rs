@@ -57,7 +57,7 @@ impl Place {
             deviation: position
                 .allowed_deviation_xy
                 .there()
-                .and_then(Deviation::radius)
+                .and_then(Deviation::farthest)
                 .unwrap_or_default(),
         })
     }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_view::StateView;
+use tck_view::{ActionState, MessageView, StateView};
 use tck_world::{Fact, Listen, Observation, Topic};
 
 /// `zones/actions`.
@@ -12,7 +12,8 @@ pub(crate) const ZONE_ACTIONS: Check = Check {
     name: "zones/actions",
     decides: &["ZACT-STATE-03", "ZACT-STATE-04", "IACT-STATE-03"],
     doc: "An actionId of zoneActionStates stands in no other list, was sent by nobody, and does not begin again once it \
-          has ended; an entry without actionType is a warning. No entry goes before a clearZoneActions was sent, and none that has not \
+          has ended; an entry without actionType is a warning. No action stands in actionStates that nobody sent, that was not \
+          there before, and that is of a type that a zone asks for which was sent. No entry that has begun goes before a clearZoneActions was sent, and none that has not \
           ended. A restart is left out.",
     arguments: &[],
     listens: &[
@@ -22,6 +23,7 @@ pub(crate) const ZONE_ACTIONS: Check = Check {
         Listen::Answer,
         Listen::ToVehicle(Topic::InstantActions),
         Listen::ToVehicle(Topic::Order),
+        Listen::ToVehicle(Topic::ZoneSet),
         Listen::Delivered(Topic::State),
     ],
     reads: &[Fact::Restarts],
@@ -32,14 +34,37 @@ pub(crate) const ZONE_ACTIONS: Check = Check {
 /// How many actions are kept in mind.
 const LIMIT: usize = 4096;
 
+/// How far an action of a zone is.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Progress {
+    /// Planned: it may never come to that.
+    Waits,
+    Begun,
+    Over,
+}
+
+impl Progress {
+    fn of(action: &ActionState) -> Self {
+        match action.action_status.text() {
+            Some("WAITING") => Self::Waits,
+            _ if action.is_over() => Self::Over,
+            _ => Self::Begun,
+        }
+    }
+}
+
 #[derive(Default)]
 struct Actions {
-    /// The entries of the last state, and whether they were over.
-    listed: Option<BTreeMap<String, bool>>,
+    /// The entries of the last state, and how far they were.
+    listed: Option<BTreeMap<String, Progress>>,
     /// actionIds that were sent to the vehicle.
     sent: BTreeSet<String>,
     /// A clearZoneActions was sent since the list was last seen to shrink.
     clearing: bool,
+    /// Types of actions that zones ask for.
+    asked: BTreeSet<String>,
+    /// actionIds of actionStates, since the first state or a restart.
+    of_orders: Option<BTreeSet<String>>,
     said: BTreeSet<String>,
 }
 
@@ -58,6 +83,52 @@ impl Actions {
     }
 }
 
+impl Actions {
+    /// Learns which types of actions zones ask for.
+    fn learn_zones(&mut self, record: &Observation<'_>) {
+        let Some(MessageView::ZoneSet(message)) = record.to_vehicle(Topic::ZoneSet) else {
+            return;
+        };
+        let zones = message
+            .zone_set
+            .there()
+            .into_iter()
+            .flat_map(|set| set.zones.iter())
+            .take(LIMIT);
+        let actions = zones.flat_map(|zone| {
+            let inside = zone.entry_actions.iter().chain(zone.during_actions.iter());
+            inside.chain(zone.exit_actions.iter())
+        });
+        for action in actions {
+            if self.asked.len() < LIMIT {
+                self.asked.insert(action.action_type.or_empty().to_owned());
+            }
+        }
+    }
+
+    /// Actions of zones that stand among those of orders.
+    fn misplaced(&mut self, state: &StateView, seq: u64, findings: &mut Vec<CheckFinding>) {
+        let listed = state.action_states.iter().take(LIMIT);
+        let now: BTreeSet<String> = listed.map(|action| action.action_id.or_empty().to_owned()).collect();
+        let known = self.of_orders.get_or_insert_with(|| now.clone());
+        for action in state.action_states.iter().take(LIMIT) {
+            let id = action.action_id.or_empty();
+            let is_new = !self.sent.contains(id) && !known.contains(id) && self.sent.len() < LIMIT;
+            if is_new && self.asked.contains(action.action_type.or_empty()) && self.said.insert(id.to_owned()) {
+                let text = format!(
+                    "action {} of type {} stands in actionStates, and no order has it",
+                    quote(id),
+                    quote(action.action_type.or_empty())
+                );
+                findings.push(broken("IACT-STATE-03", seq, text));
+            }
+        }
+        if known.len() < LIMIT {
+            known.extend(now);
+        }
+    }
+}
+
 impl Running for Actions {
     fn observe(
         &mut self,
@@ -66,19 +137,22 @@ impl Running for Actions {
         findings: &mut Vec<CheckFinding>,
     ) -> bool {
         self.hear(record);
+        self.learn_zones(record);
         if context.world.restarts().now(record) {
             self.listed = None;
+            self.of_orders = None;
         }
         let Some(state) = record.state().filter(|state| state.zone_action_states.is_there()) else {
             return false;
         };
         let seq = record.seq();
+        self.misplaced(state, seq, findings);
         let mut now = BTreeMap::new();
         for action in state.zone_action_states.iter().take(LIMIT) {
             let id = action.action_id.or_empty();
-            let again = now.insert(id.to_owned(), action.is_over()).is_some();
+            let again = now.insert(id.to_owned(), Progress::of(action)).is_some();
             let before = self.listed.as_ref().and_then(|listed| listed.get(id));
-            let begun_again = before.is_some_and(|over| *over) && !action.is_over();
+            let begun_again = before == Some(&Progress::Over) && !action.is_over();
             let others = state.action_states.iter().chain(state.instant_action_states.iter());
             let mixed = others.into_iter().any(|other| other.action_id.is(id));
             let found = if mixed {
@@ -97,9 +171,11 @@ impl Running for Actions {
         }
         let before = self.listed.take();
         let gone = before.iter().flatten().filter(|(id, _)| !now.contains_key(*id));
-        let gone: Vec<(&String, &bool)> = gone.collect();
-        for (id, over) in &gone {
-            if self.clearing && **over || self.said.len() >= LIMIT || !self.said.insert((*id).clone()) {
+        // What was only planned goes with the plan.
+        let gone: Vec<(&String, &Progress)> = gone.filter(|(_, how)| **how != Progress::Waits).collect();
+        for (id, how) in &gone {
+            if self.clearing && **how == Progress::Over || self.said.len() >= LIMIT || !self.said.insert((*id).clone())
+            {
                 continue;
             }
             // It may have ended and been cleared between two states.
@@ -108,7 +184,7 @@ impl Running for Actions {
                 findings.push(broken("ZACT-STATE-04", seq, text));
             }
         }
-        if !gone.is_empty() && now.values().all(|over| !over) {
+        if !gone.is_empty() && now.values().all(|how| *how != Progress::Over) {
             self.clearing = false;
         }
         let judged = !now.is_empty() || !gone.is_empty();

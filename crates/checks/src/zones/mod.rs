@@ -5,6 +5,10 @@ mod blocked;
 mod directed;
 mod line_guided;
 mod listed;
+mod release;
+#[cfg(test)]
+mod release_tests;
+mod requests;
 mod sets;
 mod speed;
 #[cfg(test)]
@@ -15,6 +19,8 @@ pub(super) use blocked::BLOCKED;
 pub(super) use directed::DIRECTED;
 pub(super) use line_guided::LINE_GUIDED;
 pub(super) use listed::ACTIONS_LISTED;
+pub(super) use release::{RELEASE_ASKED, RELEASE_GRANTED, RELEASE_KEPT};
+pub(super) use requests::ZONE_REQUESTS;
 pub(super) use sets::ZONE_SETS;
 pub(super) use speed::SPEED;
 

@@ -217,3 +217,32 @@ fn actions_of_zones_have_ids_and_a_list_of_their_own() {
         ["ZACT-STATE-03"]
     );
 }
+
+/// A vehicle that shows this action of a zone, and then this, beside the actions of its order.
+fn acted(first: (&str, &str), then: Option<(&str, &str)>, of_order: &Value) -> Vec<String> {
+    let asked = json!({ "entryActions": [{ "actionType": "beep", "blockingType": "NONE" }], "duringActions": [], "exitActions": [] });
+    let mut trace = vehicle(&json!([zone("ACTION", &asked)]));
+    let listed = |(id, status): (&str, &str)| json!([{ "actionId": id, "actionType": "beep", "actionStatus": status }]);
+    trace.state(&json!({ "zoneActionStates": [], "actionStates": [] }));
+    trace.state(&json!({ "zoneActionStates": listed(first), "actionStates": of_order }));
+    let then = then.map_or(json!([]), listed);
+    trace.state(&json!({ "zoneActionStates": then, "actionStates": of_order }));
+    trace.judge("zones/actions").summary()
+}
+
+#[test]
+fn what_was_only_planned_may_go() {
+    assert!(acted(("1", "WAITING"), None, &json!([])).is_empty());
+    assert!(acted(("1", "WAITING"), Some(("1", "FINISHED")), &json!([])).is_empty());
+    assert_eq!(acted(("1", "FINISHED"), None, &json!([])), ["ZACT-STATE-04"]);
+    assert_eq!(acted(("1", "RUNNING"), None, &json!([])), ["ZACT-STATE-04"]);
+}
+
+#[test]
+fn an_action_of_a_zone_does_not_stand_among_those_of_an_order() {
+    let shown = |kind: &str| json!([{ "actionId": "9", "actionType": kind, "actionStatus": "RUNNING" }]);
+    let waits = ("1", "WAITING");
+    assert_eq!(acted(waits, Some(waits), &shown("beep")), ["IACT-STATE-03"]);
+    // Nobody asked for that in a zone.
+    assert!(acted(waits, Some(waits), &shown("weigh")).is_empty());
+}

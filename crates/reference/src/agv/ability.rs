@@ -122,7 +122,9 @@ impl Agv {
     fn check_edge(&self, edge: &Edge, ends: Option<(&Node, &Node)>) -> Result<(), Refusal> {
         let unable = |field: &str, reason: &str| {
             let path = format!("{}.{field}", edge.path);
-            Refusal::at_field(Rule::Unable, reason, &path).naming("edgeId", &edge.id)
+            Refusal::at_field(Rule::Unable, reason, &path)
+                .naming("edgeId", &edge.id)
+                .because(Detail::UnusedField)
         };
         if edge.max_speed.is_some_and(|speed| speed < SLOWEST) {
             return Err(unable("maxSpeed", "the vehicle cannot drive so slowly"));

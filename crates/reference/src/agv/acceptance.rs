@@ -109,7 +109,7 @@ impl Agv {
             let refusal = Refusal::new(Rule::OtherOrderActive, "the vehicle is not in an automatic mode");
             self.object(Objection::Mode, refusal.because(Detail::Mode))?;
         }
-        if self.config.has("fatalRefuses") && self.errors.need_help() && self.allows(Permission::RefuseHelpless, true) {
+        if self.config.has("fatalRefuses") && self.allows(Permission::RefuseHelpless, self.errors.need_help()) {
             let refusal = Refusal::new(Rule::OtherOrderActive, "the vehicle waits for somebody to help it");
             return Err(refusal.because(Detail::Mode));
         }
@@ -219,6 +219,7 @@ impl Agv {
         let moment = self.moment();
         self.motion.halt(moment);
         self.motion.reached = self.is_near(&order.nodes[0]);
+        self.requests.awaited.clear();
         let last = (std::mem::take(&mut self.order.last_node), self.order.last_sequence);
         self.order = OrderState::empty(last.0);
         self.order.last_sequence = last.1;

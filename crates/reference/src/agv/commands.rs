@@ -82,7 +82,7 @@ impl Agv {
                 self.obstacles.remove(text("edgeId"));
             }
             "drive-manually" => self.drive_manually(),
-            "provoke-error" => self.provoke_error(text("errorLevel") == "FATAL", text("errorType")),
+            "provoke-error" => self.provoke_error(text("errorLevel"), text("errorType")),
             "clear-error" => self.clear_error(),
             "emergency-stop" => self.emergency_stop(),
             "release-emergency-stop" => {
@@ -287,8 +287,10 @@ impl Agv {
         self.move_to(&json!({ "x": x, "y": y }));
     }
 
-    /// A defect of the vehicle: with a FATAL one it does not run (ERR-03, ERR-04).
-    fn provoke_error(&mut self, fatal: bool, error_type: &str) {
+    /// A defect of the vehicle: with a FATAL one it does not run (ERR-03, ERR-04, ERR-06).
+    fn provoke_error(&mut self, level: &str, error_type: &str) {
+        let fatal = level == "FATAL";
+        level.clone_into(&mut self.errors.defect_level);
         let name = match error_type {
             "" if fatal => "scannerContaminated",
             "" => "maintenanceDue",

@@ -102,6 +102,10 @@ pub struct ErrorNames {
     pub blocked_zone: String,
     /// An action of a zone would break the rule of another one (ZINT-03).
     pub zone_action_conflict: String,
+    /// The release of a zone is lost, and the vehicle stops in it (ZONE-11).
+    pub release_lost: String,
+    /// The release of a zone is lost, and the vehicle drives out of it (ZREQ-13).
+    pub release_loss: String,
     /// A node turns out to be out of reach on the way (ZERR-01).
     pub node_unreachable: String,
 }
@@ -173,6 +177,8 @@ impl Default for ErrorNames {
             zone_set: name("zoneSetError"),
             blocked_zone: name("zoneError"),
             zone_action_conflict: name("zoneError"),
+            release_lost: name("zoneError"),
+            release_loss: name("zoneReleaseError"),
             node_unreachable: name("noRouteError"),
             lost: name("localizationError"),
         }
@@ -207,6 +213,7 @@ impl ErrorNames {
             (&mut names.zone_set, "error.zoneSet"),
             (&mut names.blocked_zone, "error.blockedZone"),
             (&mut names.zone_action_conflict, "error.zoneActionConflict"),
+            (&mut names.release_lost, "error.releaseLost"),
             (&mut names.node_unreachable, "error.nodeUnreachable"),
             (&mut names.lost, "error.localization"),
         ];

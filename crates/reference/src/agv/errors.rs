@@ -51,6 +51,8 @@ pub(crate) struct ActiveError {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Errors {
     pub(crate) active: Vec<ActiveError>,
+    /// errorLevel of a defect that is not fatal.
+    pub(crate) defect_level: String,
 }
 
 impl Errors {

@@ -17,7 +17,7 @@ use super::zone_sets::MOST_ZONES;
 use super::{Agv, AgvConfig};
 
 /// Optional parameters the vehicle acts on.
-const OPTIONAL_PARAMETERS: [&str; 14] = [
+const OPTIONAL_PARAMETERS: [&str; 15] = [
     "order.nodes.nodeDescription",
     "order.nodes.nodePosition",
     "order.nodes.nodePosition.theta",
@@ -30,6 +30,7 @@ const OPTIONAL_PARAMETERS: [&str; 14] = [
     "order.edges.orientation",
     "order.edges.orientationType",
     "order.edges.rotationAllowed",
+    "order.edges.reachOrientationBeforeEntering",
     "order.edges.maxRotationSpeed",
     "order.edges.length",
 ];

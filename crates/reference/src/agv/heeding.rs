@@ -56,7 +56,7 @@ pub(crate) struct Heeding {
     /// Counts what it goes into and out of.
     passages: u32,
     /// Counts actions of zones.
-    actions: u32,
+    pub(crate) actions: u32,
 }
 
 impl Heeding {
@@ -76,7 +76,6 @@ pub(crate) struct Change<'a> {
     /// Metres from the begin of the way.
     pub(crate) at: f64,
     /// zoneSetId.
-    #[allow(dead_code, reason = "for what is asked of fleet control about a zone")]
     pub(crate) set: &'a str,
     pub(crate) zone: &'a Zone,
     /// Into it, not out of it.

@@ -11,9 +11,10 @@ use super::objections::Objection;
 use super::order_message::{Edge, Node, Order};
 use super::order_state::Stop;
 use super::rejection::Rule;
-use super::requests::EdgeRequest;
+use super::requests::{EdgeRequest, RequestStatus};
+use super::zone_requests::ZoneRequest;
 use super::zone_sets::ZoneSet;
-use super::zones::Zone;
+use super::zones::{ReleaseLoss, Zone};
 use super::{Holds, Mode};
 
 /// A part of a message.
@@ -27,6 +28,8 @@ pub(crate) enum Part<'a> {
     Edge(&'a Edge),
     /// One of actionStates.
     Action(&'a Action),
+    /// One of zoneRequests.
+    ZoneRequest(&'a ZoneRequest),
     /// One of edgeRequests.
     EdgeRequest(&'a EdgeRequest),
     /// One of errors.
@@ -153,6 +156,20 @@ pub(crate) enum Permission<'a> {
     KeepRequest,
     /// A lease that has run out ends what was granted (REQ-09).
     EndLease,
+    /// It asks for anything in the mode it is in (MODE-08).
+    AskForAnything,
+    /// It goes into a zone that has to be released (ZONE-10).
+    EnterZone(&'a Zone),
+    /// It asks for a zone (ZREQ-01).
+    AskForZone,
+    /// A request for a zone stays in its states (ZREQ-10).
+    KeepZoneRequest(&'a ZoneRequest),
+    /// It heeds that the release of a zone is revoked or has expired (ZREQ-11, ZREQ-12, ZREQ-13).
+    HeedZoneLoss(&'a ZoneRequest, RequestStatus),
+    /// It stops in a zone whose release is lost (ZONE-11).
+    StayWithoutRelease(ReleaseLoss),
+    /// It stops where a zone does not say what follows when its release is lost (ZONE-13).
+    StopUnsaid,
     /// It goes back to its trajectory by the way it came (CORR-20).
     ReturnAsItCame,
     /// It heeds that a grant is lost (CORR-19).
@@ -173,6 +190,8 @@ pub(crate) enum Permission<'a> {
     TakeZoneSetAgain,
     /// A zone set is taken over with a kind of zone that it does not heed (ZSET-26).
     TakeZoneUnheeded,
+    /// A zone set is taken over with a RELEASE zone that does not say what follows when its release is lost (ZONE-13).
+    TakeReleaseUnsaid,
     /// A zone set is in force.
     ApplyZoneSet(&'a ZoneSet),
     /// A zone that is in force is heeded.

@@ -4,7 +4,7 @@
 //! ([`Device::handle`]), and takes out what is to be sent. An order is read by `read` and `order_message`, decided in
 //! `acceptance` (figure 8), with `updates` for what continues an order, `ability` for what the vehicle can do and
 //! `rejection` for how it says no. `order_state` holds the order, `progress` drives it, leg by leg as `way` and `path` plan them,
-//! and `cancel` ends it (figure 9); `requests` asks for what has to be released. `actions` knows when an action runs, `blocking` what may run beside it, `action_effect`,
+//! and `cancel` ends it (figure 9); `requests` asks for corridors that have to be released, and `zone_requests` for zones. `actions` knows when an action runs, `blocking` what may run beside it, `action_effect`,
 //! `stations`, `maps`, `zone_sets` and `downloads` what it does. `instant` takes instant actions, `commands` what people do to the
 //! vehicle, `heeding` what it does about zones. `report` says all that in states, `factsheet` what the vehicle is.
 //!
@@ -50,6 +50,7 @@ pub(crate) mod triggers;
 pub(crate) mod updates;
 pub(crate) mod way;
 mod wire;
+pub(crate) mod zone_requests;
 pub(crate) mod zone_sets;
 pub(crate) mod zones;
 
@@ -119,6 +120,8 @@ pub(crate) struct Holds {
     pub(crate) outside: bool,
     /// It has lost the release of what it drives through.
     pub(crate) release: bool,
+    /// It has lost the release of the zone that it is in.
+    pub(crate) access: bool,
     /// A defect that keeps it from running.
     pub(crate) defect: bool,
     /// It is in a zone where it must not be, or cannot do what it is asked to do there.
@@ -127,7 +130,7 @@ pub(crate) struct Holds {
 
 impl Holds {
     pub(crate) fn any(self) -> bool {
-        let outside = self.outside || self.zone || self.release;
+        let outside = self.outside || self.zone || self.release || self.access;
         self.pause || self.button || self.emergency || self.field || outside || self.defect
     }
 }

@@ -229,6 +229,7 @@ pub(crate) struct Edge {
     pub(crate) orientation: Option<f64>,
     /// orientationType GLOBAL.
     pub(crate) global: bool,
+    /// rotationAllowed, or that reachOrientationBeforeEntering does not ask for the turn before the edge.
     pub(crate) rotation_allowed: Option<bool>,
     pub(crate) trajectory: Option<Trajectory>,
     pub(crate) corridor: Option<Corridor>,
@@ -375,6 +376,7 @@ fn read_edge(fields: &Fields<'_>, unsupported: &mut Vec<String>, defects: &mut V
             fields.literal(key, &["TANGENTIAL", "GLOBAL"])
         })?
         .is_some_and(|index| index == 1);
+    let before = fields.optional("reachOrientationBeforeEntering", Fields::boolean)?;
     let limit = |fields: &Fields<'_>, key: &str| fields.number_in(key, 0.0, f64::MAX);
     Ok(Edge {
         path: fields.at("").trim_end_matches('.').to_owned(),
@@ -388,7 +390,9 @@ fn read_edge(fields: &Fields<'_>, unsupported: &mut Vec<String>, defects: &mut V
         max_rotation_speed: fields.optional("maxRotationSpeed", limit)?,
         orientation: fields.optional("orientation", Fields::number)?,
         global,
-        rotation_allowed: fields.optional("rotationAllowed", Fields::boolean)?,
+        rotation_allowed: fields
+            .optional("rotationAllowed", Fields::boolean)?
+            .or(before.map(|before| !before)),
         trajectory: part(fields, "trajectory", Trajectory::read, defects),
         corridor: part(fields, "corridor", Corridor::read, defects),
         direction: fields.optional("direction", Fields::text)?.map(str::to_owned),

@@ -27,7 +27,7 @@ pub(crate) enum Rule {
 /// What a rule is broken by, where versions have an error of its own for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Detail {
-    /// An optional field that the vehicle has no use for (OPT-02).
+    /// An optional field that the vehicle has no use for, or whose value it cannot keep to (OPT-02).
     UnusedField,
     /// The order to be updated was cancelled.
     Cancelled,

@@ -19,6 +19,7 @@ use super::order_message::{Edge, Loss};
 use super::path::ON_PATH;
 use super::progress::ALIGNED;
 use super::read::{Defect, Fields};
+use super::zone_requests::{LostRelease, ZoneName, ZoneRequest};
 use tck_base::clock::Moment;
 use tck_base::nurbs::Path;
 
@@ -104,13 +105,23 @@ pub(crate) struct Requests {
     /// Nothing is asked for before this.
     retry_at: Option<Moment>,
     back: Option<Back>,
+    pub(crate) zones: Vec<ZoneRequest>,
+    /// The zones before whose border it waits, or stops next.
+    pub(crate) awaited: Vec<ZoneName>,
+    /// The zones that it is in, and whose release it has lost.
+    pub(crate) lost: Vec<LostRelease>,
 }
 
 impl Requests {
     /// When something happens to a request by itself.
     pub(crate) fn next_end(&self, now: Moment) -> Option<Moment> {
         let leases = self.edges.iter().filter_map(|request| request.lease);
-        leases.chain(self.retry_at).filter(|end| *end > now).min()
+        let of_zones = self.zones.iter().filter_map(|request| request.lease);
+        leases
+            .chain(of_zones)
+            .chain(self.retry_at)
+            .filter(|end| *end > now)
+            .min()
     }
 
     /// Forgets everything but the number of the last request.
@@ -119,6 +130,13 @@ impl Requests {
             count: self.count,
             ..Self::default()
         };
+    }
+
+    /// The requests for a zone.
+    pub(crate) fn of_zone(&self, set: &str, zone: &str) -> impl Iterator<Item = &ZoneRequest> {
+        self.zones
+            .iter()
+            .filter(move |request| request.zone.0 == set && request.zone.1 == zone)
     }
 
     /// The request for the corridor of an edge.
@@ -150,6 +168,7 @@ impl Agv {
             if let Ok(mut answer) = self.answer(entry) {
                 self.hears_answer(&mut answer);
                 self.answered(&answer);
+                self.zone_answered(&answer);
             }
         }
     }
@@ -210,14 +229,30 @@ impl Agv {
     /// Takes a request back; the next one comes a little later.
     fn withdraw(&mut self, id: &str) {
         self.requests.edges.retain(|request| request.id != id);
+        self.asks_later();
+    }
+
+    /// The next request comes a little later.
+    pub(crate) fn asks_later(&mut self) {
         self.requests.retry_at = Some(self.moment() + RETRY);
+    }
+
+    /// Whether it asks for anything now.
+    pub(crate) fn asks_now(&self) -> bool {
+        let waits = self.requests.retry_at.is_some() || self.awaited_mode.is_some();
+        let commanded = self.allows(Permission::AskForAnything, self.mode.takes_orders());
+        !waits && commanded && self.order.cancel.is_none() && !self.order.cancelled
     }
 
     /// Looks after its requests; whether anything has changed.
     pub(crate) fn tend_requests(&mut self) -> bool {
         let moment = self.moment();
         self.requests.retry_at = self.requests.retry_at.filter(|at| *at > moment);
-        self.end_leases() | self.end_requests() | self.come_back() | self.ask_for_corridors()
+        self.end_leases()
+            | self.end_requests()
+            | self.come_back()
+            | self.ask_for_corridors()
+            | self.tend_zone_requests()
     }
 
     /// Leases that have run out.
@@ -404,8 +439,7 @@ impl Agv {
 
     /// Asks for corridors in which it could drive round something (CORR-11, CORR-12).
     fn ask_for_corridors(&mut self) -> bool {
-        let waits = self.requests.retry_at.is_some() || self.awaited_mode.is_some();
-        if waits || !self.mode.takes_orders() || self.order.cancel.is_some() || self.order.cancelled {
+        if !self.asks_now() {
             return false;
         }
         let ahead = self.order.edge_ahead().map(|edge| edge.sequence_id);

@@ -7,6 +7,7 @@ use super::hook_points::Permission;
 use super::motion::Facing;
 use super::order_message::Edge;
 use super::order_state::Stop;
+use super::progress::ALIGNED;
 use super::{Agv, Mode, motion};
 use tck_base::nurbs::Path;
 
@@ -86,6 +87,14 @@ impl Agv {
         if self.config.heeds_zones() {
             let way = curve.clone();
             let way = way.unwrap_or_else(|| Path::through([(pose.x, pose.y), (stop.place.x, stop.place.y)]));
+            let (wanted, free) = self.releases_ahead(&way.first(leg.way), leg.facing, &pose.map_id);
+            let is_new = self.awaits_zones(wanted);
+            if let Some(free) = free.filter(|free| *free < leg.way) {
+                if free <= ALIGNED {
+                    return is_new;
+                }
+                (leg.way, leg.to_node) = (free, false);
+            }
             let Some((free, limit)) = self.way_in_zones(edge, &way.first(leg.way), leg.facing, &pose.map_id) else {
                 return self.give_up_node(stop);
             };

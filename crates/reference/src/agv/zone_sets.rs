@@ -144,6 +144,9 @@ impl Agv {
             if !heeded && !self.allows(Permission::TakeZoneUnheeded, false) {
                 return unusable("the vehicle does not heed zones of this kind");
             }
+            if zone.kind == ZoneKind::Release(None) && !self.allows(Permission::TakeReleaseUnsaid, true) {
+                return unusable("it does not say what follows when its release is lost");
+            }
             if let ZoneKind::Action { entry, during, exit } = &zone.kind {
                 for request in entry.iter().chain(during).chain(exit) {
                     let kind = action_kinds::find(&self.config, &request.action_type);

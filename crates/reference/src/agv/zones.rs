@@ -1,7 +1,7 @@
 //! Zones as the vehicle understands them: read from a message, and where they lie (section 6.4.1).
 //!
-//! What becomes of a set of them stands in `zone_sets`, what the vehicle does about them on its way in `heeding`. A RELEASE
-//! zone without a loss behaviour is read as STOP (the ruling of ZONE-13), and corners are taken either way round.
+//! What becomes of a set of them stands in `zone_sets`, what the vehicle does about them on its way in `heeding`, and how it
+//! asks for them in `zone_requests`. Corners are taken either way round.
 
 use serde_json::Value;
 
@@ -10,8 +10,9 @@ use super::read::{Defect, Fields};
 use tck_base::polygon::Polygon;
 
 /// Kinds of zones this vehicle has a duty for by itself.
-pub const ZONE_TYPES: [&str; 8] = [
+pub const ZONE_TYPES: [&str; 9] = [
     "BLOCKED",
+    "RELEASE",
     "LINE_GUIDED",
     "SPEED_LIMIT",
     "ACTION",
@@ -42,7 +43,8 @@ pub(crate) enum Limitation {
 pub(crate) enum ZoneKind {
     Blocked,
     LineGuided,
-    Release(ReleaseLoss),
+    /// And what follows when the release is lost, where it says so.
+    Release(Option<ReleaseLoss>),
     CoordinatedReplanning,
     /// In metres a second.
     SpeedLimit(f64),
@@ -140,11 +142,11 @@ fn read_kind(fields: &Fields<'_>) -> Result<ZoneKind, Defect> {
             let loss = fields.optional("releaseLossBehavior", |fields, key| {
                 fields.literal(key, &["STOP", "CONTINUE", "EVACUATE"])
             })?;
-            ZoneKind::Release(match loss {
-                Some(1) => ReleaseLoss::Continue,
-                Some(2) => ReleaseLoss::Evacuate,
+            ZoneKind::Release(loss.map(|index| match index {
+                1 => ReleaseLoss::Continue,
+                2 => ReleaseLoss::Evacuate,
                 _ => ReleaseLoss::Stop,
-            })
+            }))
         }
         3 => ZoneKind::CoordinatedReplanning,
         4 => ZoneKind::SpeedLimit(fields.number_in("maximumSpeed", 0.0, f64::MAX)?),

@@ -227,7 +227,7 @@ impl Site {
     }
 
     /// The limit of an array in the factsheet.
-    fn most(&self, vehicle: &Vehicle, what: Measure, name: &str) -> usize {
+    pub(crate) fn most(&self, vehicle: &Vehicle, what: Measure, name: &str) -> usize {
         let limit = vehicle
             .factsheet
             .as_ref()

@@ -148,7 +148,11 @@ impl Topic<'_> {
                 }
             }
             PatternKind::Not(inner) => self.pattern(inner, place, found),
-            PatternKind::Elements(_) | PatternKind::Includes(_) | PatternKind::Empty(_) | PatternKind::Count(_)
+            PatternKind::Elements(_)
+            | PatternKind::Includes(_)
+            | PatternKind::Consecutive(_)
+            | PatternKind::Empty(_)
+            | PatternKind::Count(_)
                 if !can_be("array") =>
             {
                 wrong(found, "a list");
@@ -158,7 +162,7 @@ impl Topic<'_> {
                 self.pattern(&elements.pattern, place, found);
                 place.entered = entered;
             }
-            PatternKind::Includes(list) => {
+            PatternKind::Includes(list) | PatternKind::Consecutive(list) => {
                 if let Some(Value::Array(items)) = self.value(list) {
                     let entered = std::mem::replace(&mut place.entered, true);
                     for item in &items {

@@ -30,9 +30,9 @@ pub(crate) const REMAINING_ROUTE: Check = Check {
 /// `state/last-node`.
 pub(crate) const LAST_NODE: Check = Check {
     name: "state/last-node",
-    decides: &["STATE-MSG-04", "ORD-01", "ORD-07"],
+    decides: &["STATE-MSG-04", "ORD-01", "ORD-07", "NODE-09"],
     doc: "lastNodeId and lastNodeSequenceId move along the order in its sequence, and never onto a node that was not \
-          released. Not judged in an order of which an update had no number that can be read: that it was taken is the mistake.",
+          released, nor, where the version says so, onto one that the order does not have. Not judged in an order of which an update had no number that can be read: that it was taken is the mistake.",
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[Fact::Shown, Fact::Orders, Fact::Malformed],
@@ -354,11 +354,12 @@ impl Running for LastNode {
             .collect();
         if visits.is_empty() {
             let text = format!("the last node is {place}, which is not part of the order");
-            // A vehicle may know nodes on its way that the order leaves out.
-            findings.push(if nodes().any(|element| element.id == node) {
-                broken("STATE-MSG-04", seq, text)
-            } else {
-                remark("STATE-MSG-04", seq, text)
+            let known = nodes().any(|element| element.id == node);
+            findings.push(match known {
+                true => broken("STATE-MSG-04", seq, text),
+                false if context.pack.has("lastNodeOfOrder") => broken("NODE-09", seq, text),
+                // A vehicle may know nodes on its way that the order leaves out.
+                false => remark("STATE-MSG-04", seq, text),
             });
             return true;
         }

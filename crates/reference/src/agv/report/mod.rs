@@ -85,6 +85,8 @@ pub(crate) struct Changes {
     pub(crate) maps: bool,
     /// zoneSets (STATE-23).
     pub(crate) zone_sets: bool,
+    /// edgeRequests or zoneRequests (STATE-21).
+    pub(crate) requests: bool,
     /// Anything else.
     pub(crate) other: bool,
 }
@@ -114,6 +116,7 @@ impl Changes {
                 "actionStates" | "instantActionStates" | "zoneActionStates" => changes.actions = true,
                 "maps" => changes.maps = true,
                 "zoneSets" => changes.zone_sets = true,
+                "edgeRequests" | "zoneRequests" => changes.requests = true,
                 _ => changes.other = true,
             }
         }

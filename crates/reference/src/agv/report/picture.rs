@@ -6,6 +6,7 @@ use serde_json::{Map, Value, json};
 
 use crate::agv::action_kinds::MAX_HEIGHT;
 use crate::agv::actions::{Action, Origin};
+use crate::agv::errors::Life;
 use crate::agv::hook_points::Part;
 use crate::agv::{Agv, Load, Mode};
 
@@ -55,6 +56,9 @@ impl Agv {
         if self.config.uses("releaseRequired") {
             set("edgeRequests", self.edge_requests());
         }
+        if self.config.asks_for_zones() {
+            set("zoneRequests", self.zone_requests());
+        }
         set("batteryState", self.battery());
         set("operatingMode", json!(self.mode_literal()));
         set("errors", self.errors_picture());
@@ -78,7 +82,11 @@ impl Agv {
         errors
             .filter_map(|error| {
                 let rule = self.config.error_rules.get(&error.error_type);
-                let level = rule.map_or("WARNING", |rule| rule.level.as_str());
+                let usual = match (error.life, self.errors.defect_level.as_str()) {
+                    (Life::WhileDefective, level @ "URGENT") => level,
+                    _ => "WARNING",
+                };
+                let level = rule.map_or(usual, |rule| rule.level.as_str());
                 self.said(Part::Error(error), error.picture(level))
             })
             .collect()

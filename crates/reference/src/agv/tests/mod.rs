@@ -14,6 +14,7 @@ mod orders;
 mod people;
 mod personas;
 mod rejections;
+mod release;
 mod requests;
 mod rest;
 mod scenarios;

@@ -99,12 +99,7 @@ fn what_is_on_board_or_cannot_be_used_is_refused() {
     send(
         &mut bench,
         "far",
-        &[zone(
-            "z",
-            "RELEASE",
-            (9.0, 10.0),
-            &json!({ "releaseLossBehavior": "STOP" }),
-        )],
+        &[zone("z", "COORDINATED_REPLANNING", (9.0, 10.0), &json!({}))],
     );
     bench.send(
         "zoneSet",

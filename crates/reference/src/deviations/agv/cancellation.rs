@@ -7,6 +7,14 @@ use super::prelude::*;
 records! {
     fault "cancels-whatever-order" ["ORD-CANCEL-25", "ORD-CANCEL-18"] "Cancels the order that it has, whatever order cancelOrder names."
         => forbidding(|_, what| matches!(what, Permission::LeaveOrder));
+    fault "another-cancel-halts" ["ORD-CANCEL-25"] "Keeps its order when cancelOrder names another one, and drives no more until it gets a new one."
+        => parked()
+            .does(|parked, agv, action| {
+                let named = action.text("orderId");
+                *parked |= is(action, Effect::CancelOrder) && !named.is_empty() && named != agv.order.order_id;
+                None
+            })
+            .happens(|parked, _, event| *parked &= event != Event::Begun);
     fault "named-order-not-cancelled" ["ORD-CANCEL-24"] "Takes a cancelOrder that names an order for one without an order."
         => letting(|_, what| matches!(what, Permission::LeaveOrder));
     fault "cancel-drives-on" ["ORD-CANCEL-02"] "Drives its base to the end before it obeys cancelOrder."
@@ -103,7 +111,7 @@ records! {
             usual.filter(|_| !queued)
         })
         .allows(|_, _, what, usual| usual && !matches!(what, Permission::ForgetQueue));
-    fault "cancel-drops-waiting" ["ORD-CANCEL-12", "ORD-CANCEL-03"] "cancelOrder removes the actions that have not begun from actionStates instead of reporting them FAILED."
+    fault "cancel-drops-waiting" ["ORD-CANCEL-12", "ORD-CANCEL-03", "STATE-MSG-10"] "cancelOrder removes the actions that have not begun from actionStates instead of reporting them FAILED."
         => keep::<Vec<String>>()
             .does(|waiting, agv, action| {
                 if is(action, Effect::CancelOrder) {
@@ -126,7 +134,7 @@ records! {
         => plain()
             .happens(|(), agv, event| if event == Event::CancelBegun { agv.flush() })
             .allows(|(), _, what, usual| usual && !matches!(what, Permission::CancelAwaits(_)));
-    fault "cancel-not-running" ["ORD-CANCEL-06", "ASTATE-05"] "It reports cancelOrder WAITING instead of RUNNING as long as an action is still running."
+    fault "cancel-not-running" ["ORD-CANCEL-06", "ASTATE-05", "ORD-CANCEL-29"] "It reports cancelOrder WAITING instead of RUNNING as long as an action is still running."
         => when(Event::CancelBegun, |agv| if let Some(cancel) = &agv.order.cancel && let Some(action) = agv.actions.get_mut(&cancel.action_id) {
             action.status = Status::Waiting;
         })

@@ -57,6 +57,15 @@ records! {
         => when(Event::Leaving, |agv| agv.connection.repeat_header_id("connection"));
     fault "offline-then-broken" ["CONN-10", "CONN-08"] "Says CONNECTIONBROKEN itself after OFFLINE."
         => when(Event::Left, |agv| agv.publish_connection("CONNECTIONBROKEN"));
+    fault "will-of-first-vehicle" ["CONN-01", "CONN-02"] "Topic and header of its last will are those of another vehicle, the first one of the fleet."
+        => joining(|agv, options| if let Some(will) = &mut options.will {
+            let own = format!("/{}/", agv.config.serial_number);
+            will.topic = will.topic.replace(&own, "/AGV-001/");
+            if let Ok(Value::Object(mut words)) = serde_json::from_slice(&will.payload) {
+                words.set("serialNumber", "AGV-001");
+                will.payload = Value::Object(words).to_string().into();
+            }
+        });
     fault "no-disconnect" ["CONN-08"] "Closes the socket after OFFLINE without a DISCONNECT."
         => plain().allows(|(), _, what, usual| usual && !matches!(what, Permission::Disconnect));
     fault "connection-qos-0" ["MQTT-08"] "Publishes the connection topic with QoS 0."

@@ -126,6 +126,9 @@ records! {
     fault "zero-deviation-unlimited" ["ORD-MSG-13", "NODE-01"] "It reports a node with allowedDeviationXY 0 traversed half a metre before it gets there."
         because "What is usual is stated by the vendor; the ruling of ORD-MSG-13 warns where the default of 0.1 m is passed."
         => ending_early(|stop| stop.node.position.as_ref().and_then(|position| position.allowed_deviation) == Some(0.0));
+    fault "absent-deviation-unlimited" ["ORD-MSG-32"] "It reports a node without allowedDeviationXY traversed half a metre before it gets there."
+        because "What is usual is stated by the vendor; where the default of 0.1 m is passed, it is warned of."
+        => ending_early(|stop| stop.node.position.as_ref().is_some_and(|position| position.allowed_deviation.is_none()));
     fault "tangent-ignored" ["ORD-MSG-23"] "Looks the same way all along a curve."
         => steering(|_, course| if course.curved {
             course.heading = course.straight;

@@ -11,6 +11,11 @@ records! {
         => sending(|_, out| if out.name == "factsheet" { out.message.unset("agvGeometry") });
     fault "factsheet-kinematics-unknown" ["FACT-03", "JSON-02"] "Gives DIFFERENTIAL as its kinematics."
         => factsheet(|_, m| m.part("typeSpecification", |t| t.set("agvKinematic", "DIFFERENTIAL")));
+    fault "factsheet-without-action-flags" ["FACT-07"] "Its factsheet does not say of any action whether it can be paused or cancelled."
+        => factsheet(|_, m| m.part("protocolFeatures", |features| features.each("agvActions", |action| {
+            action.unset("pauseAllowed");
+            action.unset("cancelAllowed");
+        })));
     fault "class-unknown" ["FACT-03"] "Its factsheet gives its agvClass as AMR."
         => factsheet(|_, m| m.part("typeSpecification", |t| t.set("agvClass", "AMR")));
     fault "localization-types-as-text" ["FACT-03"] "It gives localizationTypes in the factsheet as a single string instead of an array."

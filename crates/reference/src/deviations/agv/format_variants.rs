@@ -140,9 +140,9 @@ records! {
     tolerance "states-retained" ["MQTT-07", "STATE-01"] "It publishes its states with the retain flag."
         => sending(|_, outgoing| outgoing.retain |= outgoing.name == "state");
     tolerance "header-id-wraps" ["HDR-02"] "It starts its headerIds a little below 4294967295 and goes on with 0 behind it."
-        => header(|_, _, m| begin_at(m, u32::MAX - 12));
+        => counting_from::<{ u32::MAX - 12 }>();
     tolerance "header-id-starts-high" ["HDR-02"] "Its headerIds begin at 70000 on every topic."
-        => header(|_, _, m| begin_at(m, 70_000));
+        => counting_from::<70_000>();
     tolerance "clock-ahead" ["HDR-03"] "Its clock is one and a half seconds ahead."
         => header(|agv, _, m| {
             let ahead = agv.now.utc.checked_add(jiff::SignedDuration::from_millis(1_500));
@@ -187,11 +187,23 @@ fn worn_brush() -> Value {
         "errorReferences": [{ "referenceKey": "part", "referenceValue": "brush 2" }] })
 }
 
-/// Counts from there.
-fn begin_at(header: &mut Object, first: u32) {
-    let id = header.get("headerId").and_then(Value::as_u64);
+/// Counts its messages from there, and names them so.
+fn counting_from<const FIRST: u32>() -> Box<dyn Deviation> {
+    plain()
+        .heads(|(), _, _, m| begin_at(m, "headerId", FIRST))
+        .says(|(), _, part, m| {
+            if matches!(part, Part::Visualization) {
+                begin_at(m, "referenceStateHeaderId", FIRST);
+            }
+            true
+        })
+}
+
+/// Moves a count.
+fn begin_at(words: &mut Object, key: &str, first: u32) {
+    let id = words.get(key).and_then(Value::as_u64);
     if let Some(id) = id.and_then(|id| u32::try_from(id).ok()) {
-        header.set("headerId", id.wrapping_add(first));
+        words.set(key, id.wrapping_add(first));
     }
 }
 

@@ -175,6 +175,16 @@ records! {
         => letting(|_, what| matches!(what, Permission::TakeTime(action) if is(action, Effect::InitPosition)));
     tolerance "map-actions-take-time" ["MAP-24", "MAP-29", "ACT-41"] "enableMap and deleteMap are RUNNING for a moment before the maps change."
         => letting(|_, what| matches!(what, Permission::TakeTime(action) if is(action, Effect::EnableMap) || is(action, Effect::DeleteMap)));
+    tolerance "clears-itself-too" ["IACT-STATE-04"] "It shows clearInstantActions FINISHED, and removes it a moment later with all others that have ended."
+        => keep::<Option<Moment>>()
+            .does(|due, agv, action| is(action, Effect::ClearInstantActions).then(|| {
+                *due = Some(agv.moment() + brief(agv));
+                Outcome::Done(None)
+            }))
+            .happens(|due, agv, event| if event == Event::Woken && due.take_if(|due| *due <= agv.moment()).is_some() {
+                agv.actions.retain(|action| action.origin != Origin::Instant || !action.status.is_terminal());
+            })
+            .due(|due, _| *due);
 }
 
 /// Whether it is not for instantActions.

@@ -30,6 +30,13 @@ records! {
         });
     fault "obeys-in-its-sleep" ["HIB-06"] "It takes orders and instant actions in hibernation, and shows them when it wakes."
         => letting(|_, what| matches!(what, Permission::HeedAsleep));
+    fault "answers-in-its-sleep" ["HIB-06"] "It answers a stateRequest or a factsheetRequest in hibernation, and sleeps on."
+        => plain().hears(|(), agv, name, payload| {
+            if agv.sleep.asleep && name == "instantActions" {
+                answer_asleep(agv, payload);
+            }
+            true
+        });
     fault "takes-up-what-it-slept-through" ["HIB-06"] "It works off what it was sent in hibernation as soon as it wakes."
         => keep::<Vec<Vec<u8>>>()
             .hears(|missed, agv, name, payload| {
@@ -60,6 +67,8 @@ records! {
         => forbidding(|agv, what| agv.sleep.blocked && matches!(what, Permission::HeedSwitch));
     fault "shuts-down-mid-order" ["SHUT-01"] "It shuts down although it has an order."
         => forbidding(|_, what| matches!(what, Permission::RefuseShutdown));
+    fault "refused-shutdown-done" ["SHUT-01"] "It says that shutdown has failed while it has an order, and is off a moment later."
+        => failed(Effect::Shutdown, |agv, _| agv.shut_down());
     fault "shutdown-ends-the-order" ["SHUT-01"] "It refuses to shut down while it has an order, and gives the order up all the same."
         => failed(Effect::Shutdown, |agv, _| agv.give_up_order());
     fault "shutdown-is-a-word" ["SHUT-02"] "It reports shutdown FINISHED and stays where it is."
@@ -84,8 +93,24 @@ records! {
             }
             true
         });
+    fault "failed-retriable-keeps-running" ["RETRY-01"] "An action that may be tried again stays RUNNING when it has failed." because "To wait for a retry is a permission; what is neither is remarked on."
+        => action(|_, action, m| {
+            if action.request.retriable && matches!(action.status, Status::Retriable | Status::Failed) {
+                m.set("actionStatus", "RUNNING");
+            }
+            true
+        });
     fault "retriable-survives-cancel" ["ORD-CANCEL-27", "RETRY-06"] "An action that waits for a retry goes on waiting when its order is cancelled."
         => breaking(|_, action, usual| usual.filter(|_| action.status != Status::Retriable));
+    fault "pause-lingers" ["STATE-18"] "It goes on saying that it is paused for five seconds after the pause has ended."
+        => keep::<Option<Moment>>()
+            .happens(|until, agv, event| if event == Event::Resuming { *until = Some(agv.moment() + Duration::from_secs(5)) })
+            .says(|until, agv, part, m| {
+                if until.is_some_and(|until| agv.moment() < until) && matches!(part, Part::State) {
+                    m.set("paused", true);
+                }
+                true
+            });
     fault "flags-without-state" ["STATE-18", "STATE-19"] "It sends no state of its own when paused or safetyState changes."
         => plain().tells(|(), _, changes, _| match changes.other && !changes.actions && !changes.error {
             true => Telling::Later,
@@ -106,4 +131,27 @@ records! {
         => after(Effect::Trigger, |_, _, _| Outcome::Done(None));
     fault "any-trigger-will-do" ["ACT-37"] "A button on the vehicle ends what waits for the fleet control alone." because "The text does not say that nothing else may end it."
         => letting(|_, what| matches!(what, Permission::HeedTrigger(action) if action.status == Status::Running));
+    fault "certificate-fetched-in-clear" ["CERT-03"] "It fetches key and certificate over plain HTTP, and takes them over."
+        => forbidding(|_, what| matches!(what, Permission::RefusePlainLink));
+    tolerance "never-waits-for-a-retry" ["RETRY-01"] "A retriable action that fails is FAILED at once."
+        => failure(|agv, action, _| {
+            if action.status == Status::Retriable {
+                agv.end_failed(&action.request.id);
+            }
+            true
+        });
+}
+
+/// Takes the requests for a state and a factsheet out of an instantActions message, and answers them.
+fn answer_asleep(agv: &mut Agv, payload: &[u8]) {
+    let Ok(mut message) = serde_json::from_slice::<Value>(payload) else {
+        return;
+    };
+    if let Some(actions) = message.get_mut("actions").and_then(Value::as_array_mut) {
+        actions.retain(|action| matches!(action["actionType"].as_str(), Some("stateRequest" | "factsheetRequest")));
+        if !actions.is_empty() {
+            agv.sleep.speaks = true;
+            agv.instant_actions_received(message.to_string().as_bytes());
+        }
+    }
 }

@@ -36,6 +36,7 @@ mod predefined;
 mod prelude;
 mod reading;
 mod refusals;
+mod release;
 mod requests;
 mod route;
 mod running;
@@ -84,6 +85,7 @@ const RECORDS: Records<dyn Deviation> = Records(&[
     cancellation::RECORDS,
     driving::RECORDS,
     requests::RECORDS,
+    release::RECORDS,
     running::RECORDS,
     pause::RECORDS,
     instants::RECORDS,

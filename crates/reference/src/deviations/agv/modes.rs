@@ -160,6 +160,17 @@ records! {
             e.fatal &= !matches!(cause, Cause::Defect);
             true
         });
+    fault "deaf-to-the-cleared-order" ["ORD-CLEAR-12"] "It says nothing to an update of an order that a mode has cleared." because "Whether it accepts or refuses the update is left to it; that it says nothing is remarked on."
+        => keep::<bool>()
+            .happens(|cleared, _, event| match event {
+                Event::GivenUpForMode(_) => *cleared = true,
+                Event::Begun => *cleared = false,
+                _ => {}
+            })
+            .hears(|cleared, agv, name, payload| {
+                let message: Value = serde_json::from_slice(payload).unwrap_or_default();
+                !(*cleared && name == "order" && message["orderId"] == agv.order.order_id.as_str())
+            });
     fault "fatal-drives" ["ERR-04"] "Drives on with a FATAL error."
         => forbidding(|_, what| matches!(what, Permission::StopForDefect));
     fault "rejection-gone-when-order-done" ["ORD-REJ-03", "ORD-REJ-08"] "It removes the warnings about refused orders when the order under way is complete, before a new order is accepted."

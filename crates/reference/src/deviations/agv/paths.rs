@@ -24,6 +24,15 @@ records! {
                 number(first, "x", |x| x + 3.0);
             }
         }));
+    fault "planned-path-without-nodes" ["PATH-03"] "The nodes that its planned path goes through stand in a text, and not in a list."
+        => state(|_, m| m.part("plannedPath", |path| path.set("traversedNodes", "A1, A2")));
+    fault "waypoint-without-place" ["PATH-06"] "Its waypoints have a time and no place."
+        => state(|_, m| m.part("intermediatePath", |path| path.each("polyline", &mut |point: &mut Object| {
+            point.unset("x");
+            point.unset("y");
+        })));
+    fault "one-waypoint" ["PATH-06"] "Its next metres are one waypoint while it drives." because "How many waypoints there are is remarked on."
+        => state(|_, m| m.part("intermediatePath", |path| path.change("polyline", |points| if let Some(points) = points.as_array_mut() { points.truncate(1); })));
     fault "traverses-unknown-nodes" ["PATH-03"] "It names nodes on its path that its order does not have."
         => state(|_, m| m.part("plannedPath", |path| path.set("traversedNodes", json!(["somewhere"]))));
     fault "planned-path-without-its-last-knot" ["PATH-03"] "The knot vector of its planned path is one too short."

@@ -194,8 +194,26 @@ records! {
         => latched(|agv, event| event == Event::Releasing && agv.holds.emergency, |m| m.part("safetyState", |safety| safety.set("eStop", "MANUAL")));
     fault "field-violation-latched" ["STATE-MSG-17"] "After the safety field is free again fieldViolation stays true until the next order."
         => latched(|agv, event| event == Event::FieldFreed && agv.holds.field, |m| m.part("safetyState", |safety| safety.set("fieldViolation", true)));
-    tolerance "actions-run-on-in-pause" ["ACT-15", "ACT-18"] "Running actions go on while it is paused by startPause."
+    fault "pausable-actions-run-on" ["ACT-15", "ACT-43"] "It reports startPause FINISHED as soon as it stands, and running actions go on although it says that they can be paused."
         => forbidding(|agv, what| matches!(what, Permission::HoldActions) && agv.holds.pause && !agv.holds.button && !agv.holds.emergency && !agv.holds.field);
+    fault "holds-what-cannot-be-paused" ["ACT-43"] "It reports actions PAUSED in a pause of which its factsheet says that they cannot be paused." because "The observation of ACT-43 is a warning."
+        => action(|agv, action, m| {
+            let bound = action.kind.is_some_and(|kind| !kind.pausable) && action.occupies();
+            if agv.holds.pause && bound && action.status == Status::Running {
+                m.set("actionStatus", "PAUSED");
+            }
+            true
+        });
+    tolerance "actions-run-on-in-pause" ["ACT-15", "ACT-18"] "Running actions go on while it is paused by startPause, as its factsheet says where the version asks for that."
+        => forbidding(|agv, what| matches!(what, Permission::HoldActions) && agv.holds.pause && !agv.holds.button && !agv.holds.emergency && !agv.holds.field)
+            .says(|_, _, part, m| {
+                if matches!(part, Part::Factsheet) {
+                    m.part("protocolFeatures", |features| features.each("agvActions", |action| if action.contains_key("pauseAllowed") {
+                        action.set("pauseAllowed", false);
+                    }));
+                }
+                true
+            });
     tolerance "resumes-in-a-moment" ["ASTATE-04", "ACT-18"] "Lets held actions go on half a second after the pause has ended."
         => keep::<Option<Moment>>()
             .happens(|due, agv, event| match event {

@@ -56,6 +56,12 @@ records! {
                 _ => json!("?"),
             };
         }));
+    fault "descriptor-taken-for-an-id" ["OPT-07"] "It takes the descriptor of a node for its id."
+        => reading(|_, order| order.each("nodes", &mut |node: &mut Object| {
+            if let Some(name) = node.get("nodeDescription").filter(|name| name.is_string()).cloned() {
+                node.set("nodeId", name);
+            }
+        }));
     fault "blocking-type-unchecked" ["ORD-REJ-01"] "Takes every word it does not know for the blockingType NONE."
         => reading(|_, order| members(order, &|key, value| {
             let known = |word: &str| matches!(word, "NONE" | "SOFT" | "HARD");

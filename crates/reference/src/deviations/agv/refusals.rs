@@ -159,7 +159,7 @@ records! {
     fault "refused-actions-listed" ["ORD-REJ-09"] "Lists the actions of an order it cannot perform as FAILED."
         => refusing(|agv, message, rule| if rule == Rule::Unable && let Ok(order) = Order::read(message) {
             for request in order.actions() {
-                let mut action = Action::waiting(request.clone(), None, Origin::Instant);
+                let mut action = Action::waiting(request.clone(), None, Origin::Node(0));
                 action.end(Status::Failed);
                 agv.actions.push(action);
             }

@@ -86,7 +86,10 @@ records! {
     fault "request-ids-repeated" ["ZREQ-04"] "The next request has the requestId of the one before."
         because "Another sentence asks for ids that are unique among active requests only; the ruling of ZREQ-04 warns."
         => allowing(|agv, what, usual| match what {
-            Permission::CountRequest => agv.requests.count == 0,
+            Permission::CountRequest => {
+                let requests = &agv.requests;
+                requests.count == 0 || !requests.edges.is_empty() || !requests.zones.is_empty()
+            }
             _ => usual,
         });
     fault "corridor-lease-ignored" ["REQ-09", "CORR-19", "REQ-12"] "It does not heed the end of a lease."
@@ -125,10 +128,14 @@ records! {
             answer.request_id.clear();
         });
     fault "response-to-another-taken" ["REQ-17", "CORR-14"] "It takes any response for an answer to its own request."
-        => hearing(|agv, answer| if let Some(request) = agv.requests.edges.first() {
-            answer.request_id.clone_from(&request.id);
+        => hearing(|agv, answer| {
+            let edges = agv.requests.edges.iter().map(|request| &request.id);
+            let mut asked = edges.chain(agv.requests.zones.iter().map(|request| &request.id));
+            if let Some(id) = asked.next() {
+                answer.request_id.clone_from(id);
+            }
         });
-    fault "corridor-grant-kept-for-later" ["CORR-17"] "It leaves its trajectory once more on an edge for which it was granted a corridor before, and does not ask again."
+    fault "corridor-grant-kept-for-later" ["CORR-17", "CORR-16"] "It leaves its trajectory once more on an edge for which it was granted a corridor before, and does not ask again."
         => keep::<BTreeSet<u32>>()
             .hears_answer(|granted, agv, answer| {
                 let request = agv.requests.edges.iter().find(|request| request.id == answer.request_id);
@@ -158,6 +165,17 @@ records! {
         => keeping(|corridor| corridor.release_required = true);
     tolerance "requests-ahead" ["CORR-13"] "It asks for the corridors of its whole base at once."
         => letting(|agv, what| matches!(what, Permission::Ask(edge) if edge.released && agv.has_to_ask(edge)));
+    tolerance "revocation-shown-once" ["REQ-12", "ZREQ-11"] "It shows a request that is revoked before it is used as REVOKED in one state before it removes it."
+        => plain().hears_answer(|(), agv, answer| {
+            let unused = |request: &&mut EdgeRequest| request.id == answer.request_id && request.status == RequestStatus::Granted && request.way.is_none();
+            if answer.grant == Grant::Revoked && let Some(request) = agv.requests.edges.iter_mut().find(unused) {
+                request.status = RequestStatus::Revoked;
+                agv.flush();
+                if let Some(request) = agv.requests.edges.iter_mut().find(|request| request.id == answer.request_id) {
+                    request.status = RequestStatus::Granted;
+                }
+            }
+        });
     tolerance "queued-shown-as-requested" ["REQ-02", "REQ-06"] "It says REQUESTED of a request that was queued."
         => wording(|request, m| {
             if request.status == RequestStatus::Queued {

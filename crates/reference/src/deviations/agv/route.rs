@@ -12,6 +12,10 @@ records! {
         => state(|agv, m| if agv.order.cancel.as_ref().is_some_and(|cancel| cancel.to_node) { m.set("nodeStates", json!([])) });
     fault "traversed-nodes-listed" ["STATE-12", "NODE-03"] "Keeps listing the node it has reached last."
         => state(|agv, m| if !is_done(agv) { list_last_node(agv, m) });
+    fault "first-node-listed-until-the-second" ["ORD-15", "NODE-03", "STATE-12"] "Lists the first node of an order until it has traversed the second one."
+        => state(|agv, m| if !is_done(agv) && agv.order.left.0.as_ref().is_some_and(|stop| stop.node.sequence_id == 0) {
+            list_last_node(agv, m);
+        });
     fault "finished-order-listed" ["STATE-13"] "Keeps the last node in its states when the order is complete."
         => state(|agv, m| if is_done(agv) && agv.order.has_order() { list_last_node(agv, m) });
     fault "last-route-listed" ["STATE-13", "NODE-03"] "Keeps the last node and the last edge in its states when the order is complete."

@@ -13,6 +13,17 @@ records! {
                 *phases = [phases.drain(..).flatten().collect()].into();
             }
         });
+    fault "others-beside-single" ["BLOCK-08"] "It begins what stands behind a SINGLE action in its list while that still runs."
+        => forbidding(|_, what| matches!(what, Permission::Await(action, origin) if action.request.blocking == Blocking::Single && action.origin == origin));
+    fault "single-first" ["BLOCK-10"] "It begins the SINGLE action of a list before those that stand before it."
+        => plain().queues(|(), agv, _, phases| {
+            let single = |ids: &Vec<String>| ids.iter().filter_map(|id| agv.actions.get(id)).any(|action| action.request.blocking == Blocking::Single);
+            if let Some(at) = phases.iter().position(single)
+                && let Some(phase) = phases.remove(at)
+            {
+                phases.push_front(phase);
+            }
+        });
     fault "actions-held-offline" ["MQTT-04"] "As long as the link is broken it drives on but begins no action of its order."
         => forbidding(|agv, what| matches!(what, Permission::Act) && !agv.connection.online);
     fault "semiautomatic-actions-held" ["MODE-02"] "It does not begin the actions of its order in SEMIAUTOMATIC."
@@ -223,6 +234,10 @@ records! {
         => letting(|_, what| matches!(what, Permission::DriveDuring(action) if is_soft(action)));
     fault "hard-drives" ["BLOCK-04"] "Drives while a HARD action runs."
         => letting(|_, what| matches!(what, Permission::DriveDuring(action) if action.request.blocking == Blocking::Hard));
+    fault "single-holds" ["BLOCK-09"] "It stands while a SINGLE action runs." because "To drive on is a permission; a vehicle that stands is remarked on."
+        => forbidding(|_, what| matches!(what, Permission::DriveDuring(action) if action.request.blocking == Blocking::Single));
+    fault "edge-passes-single" ["BLOCK-11"] "An action of an edge begins beside a SINGLE action of the node before it." because "A figure shows an overlap, so that it is remarked on."
+        => forbidding(|_, what| matches!(what, Permission::Await(action, origin) if action.request.blocking == Blocking::Single && action.origin != origin));
     fault "trigger-not-awaited" ["ACT-37"] "Ends waitForTrigger by itself."
         => triggered(|| MOMENT);
     fault "trigger-given-up" ["ACT-37"] "Waits for a trigger for a second and a half only."
@@ -233,7 +248,7 @@ records! {
         => triggered(|| Duration::from_millis(1));
     fault "finished-actions-removed" ["STATE-MSG-10"] "Removes actions from its states when they are done."
         => forgetting(|_| true);
-    fault "finished-instant-forgotten" ["STATE-MSG-09", "STATE-MSG-10", "IACT-STATE-01"] "Removes instant actions from its states when they are done."
+    fault "finished-instant-forgotten" ["STATE-MSG-09", "STATE-MSG-10", "IACT-STATE-01", "ACT-26"] "Removes instant actions from its states when they are done."
         => forgetting(|action| !action.of_order());
     fault "action-errors-never-clear" ["ERR-01"] "It never removes the error of a failed action, also not after the next orders were accepted and completed."
         => failure(|_, _, e| {

@@ -42,6 +42,11 @@ records! {
         => sending(|_, out| if out.periodic {
             out.message.set("information", json!([{ "infoType": "place", "infoDescription": "Lagerpl@tz", "infoLevel": "INFO" }]));
         }).writes(|_, _, out, text| if out.periodic { replace(text, b"Lagerpl@tz", b"Lagerpl\xe4tz") });
+    fault "refusal-text-latin-1" ["JSON-03", "MQTT-02"] "Encodes the description of the error of every order it refuses in Latin-1."
+        => refusal(|_, _, _, error| {
+            "Auftrag abgel@hnt".clone_into(&mut error.description);
+            true
+        }).writes(|_, _, _, text| replace(text, b"abgel@hnt", b"abgel\xe4hnt"));
     fault "nan-velocity" ["JSON-08", "MQTT-02", "STATE-02"] "Writes NaN as turning speed into its periodic states."
         => sending(|_, out| if out.periodic { out.message.set("velocity", json!({ "vx": 0.0, "vy": 0.0, "omega": "@" })) })
             .writes(|_, _, out, text| if out.periodic { replace(text, b"\"@\"", b"NaN") });

@@ -109,6 +109,27 @@ records! {
         => state(|agv, m| if is_done(agv) { m.set("paused", agv.holds.button || agv.holds.emergency) });
     fault "new-base-request-always" ["STATE-16"] "Asks for a new base all the time." because "It breaks a recommendation only."
         => state(|_, m| m.set("newBaseRequest", true));
+    fault "base-request-outlives-update" ["STATE-20"] "It asks for a new base for two more seconds when an update has come." because "The moment of the change inside the vehicle is not seen, so that a late state is remarked on."
+        => keep::<Option<Moment>>()
+            .happens(|until, agv, event| match event {
+                Event::Updated => *until = Some(agv.moment() + Duration::from_secs(2)),
+                Event::Begun => *until = None,
+                _ => {}
+            })
+            .says(|until, agv, part, m| {
+                if until.is_some_and(|until| agv.moment() < until) && matches!(part, Part::State) {
+                    m.set("newBaseRequest", true);
+                }
+                true
+            });
+    fault "instant-actions-in-both-lists" ["IACT-STATE-03"] "It lists instant actions among the actions of its order, too."
+        => state(|_, m| for action in m.list("instantActionStates").to_vec() { m.add("actionStates", action); });
+    fault "order-actions-in-both-lists" ["IACT-STATE-03"] "It lists the actions of its order among the instant actions, too."
+        => state(|_, m| for action in m.list("actionStates").to_vec() { m.add("instantActionStates", action); });
+    fault "foreign-node-on-the-way" ["NODE-09"] "It names a tag beside its way as its last node while it drives an order."
+        => state(|agv, m| if agv.order.entered && !agv.order.nodes.is_empty() {
+            m.set("lastNodeId", "tag-17");
+        });
     fault "new-base-request-stays" ["STATE-16"] "Asks for a new base until its next order, once it has done so." because "It breaks a recommendation only."
         => keep::<bool>()
             .happens(|asked, agv, event| match event {

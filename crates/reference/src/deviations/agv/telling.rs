@@ -19,6 +19,8 @@ records! {
         => untold(|_, changes, _| changes.maps, Telling::Later);
     fault "zone-sets-without-state" ["STATE-23"] "Does not send a state when its zone sets change."
         => untold(|_, changes, _| changes.zone_sets, Telling::Later);
+    fault "requests-without-state" ["STATE-21"] "Does not send a state when what it has asked for is answered."
+        => untold(|agv, changes, _| changes.requests && asks_already(agv), Telling::Later);
     fault "node-without-state" ["STATE-06"] "Does not send a state when it drives over a node."
         => untold(|_, changes, _| changes.node && !changes.order, Telling::Never);
     fault "driving-without-state" ["STATE-08"] "Does not send a state when it starts or stops."
@@ -118,6 +120,16 @@ records! {
                 battery.set("batteryCharge", 87.5 - f64::from(used) * 0.01);
             });
         });
+}
+
+/// Whether the last state lists a request.
+fn asks_already(agv: &Agv) -> bool {
+    let last = agv.report.last.as_ref().map(|(_, body)| body);
+    let lists = |key: &str| {
+        let requests = last.and_then(|body| body.get(key)?.as_array());
+        requests.is_some_and(|requests| !requests.is_empty())
+    };
+    lists("zoneRequests") || lists("edgeRequests")
 }
 
 type Untold = fn(&Agv, Changes, bool) -> bool;

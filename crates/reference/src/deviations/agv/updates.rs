@@ -58,7 +58,7 @@ records! {
         => overlooking(|agv, what| matches!(what, Objection::Joint(first) if runs(agv) && first.id == agv.order.base_end.0));
     fault "joint-node-unchecked" ["ORD-FLOW-10"] "It joins an update to its completed order by the sequenceId alone, whatever the nodeId of the first node."
         => overlooking(|agv, what| matches!(what, Objection::Joint(first) if !runs(agv) && first.sequence_id == agv.order.last_sequence));
-    fault "cancelled-order-revived" ["ORD-FLOW-10", "ORD-CANCEL-02", "ORD-CANCEL-11"] "Goes on with a cancelled order when an update of it comes late."
+    fault "cancelled-order-revived" ["ORD-FLOW-10", "ORD-CANCEL-02", "ORD-CANCEL-11", "ORD-CANCEL-21"] "Goes on with a cancelled order when an update of it comes late."
         => updating(|agv, _| revive(agv)).allows(|_, _, what, usual| usual || matches!(what, Permission::Overlook(Objection::Cancelled)));
     fault "update-after-cancel-called-outdated" ["ORD-CANCEL-21"] "Reports an update of a cancelled order as an outdated one."
         => refusal(|agv, _, _, e| {

@@ -98,7 +98,7 @@ records! {
         });
     fault "zone-sets-not-listed" ["ZSET-14", "ZSET-01"] "Never lists its zone sets."
         => state(|_, words| words.change("zoneSets", |sets| *sets = json!([])));
-    fault "zone-sets-listed-when-enabled" ["ZSET-14", "ZSET-07"] "Lists only zone sets that are enabled."
+    fault "zone-sets-listed-when-enabled" ["ZSET-14", "ZSET-07", "ZSET-17"] "Lists only zone sets that are enabled."
         => state(|_, words| words.change("zoneSets", |sets| if let Value::Array(sets) = sets {
             sets.retain(|set| set["zoneSetStatus"] == "ENABLED");
         }));

@@ -1,7 +1,10 @@
 //! Deviations of what a vehicle does in zones (sections 6.4.1, 6.4.4 and 6.4.5).
 
 use crate::agv::hook_points::Passage;
-use crate::agv::zones::ZoneKind;
+use crate::agv::motion::Pose;
+use crate::agv::order_message::ActionRequest;
+use crate::agv::zones::{Zone, ZoneKind};
+use tck_base::polygon::Point;
 
 use super::prelude::*;
 
@@ -77,6 +80,27 @@ records! {
             _ => false,
         });
 
+    fault "last-zone-speed-taken" ["ZINT-04", "ZONE-17"] "Of overlapping SPEED_LIMIT zones it keeps the speed of the one that comes last in the zone set."
+        => forbidding(|agv, what| match what {
+            Permission::HeedZone(zone) if matches!(zone.kind, ZoneKind::SpeedLimit(_)) => {
+                let inside = |other: &Zone| agv.heeding.inside.iter().any(|(_, there)| there == other);
+                agv.zone_sets.all.iter().filter(|set| set.enabled).any(|set| {
+                    let behind = set.zones.iter().skip_while(|other| *other != zone).skip(1);
+                    behind.into_iter().any(|other| matches!(other.kind, ZoneKind::SpeedLimit(_)) && inside(other))
+                })
+            }
+            _ => false,
+        });
+    fault "released-node-opens-blocked-zone" ["ZONE-02", "ZONE-05", "ZINT-01"] "Takes no notice of a BLOCKED zone in which a released node of its order lies."
+        => forbidding(|agv, what| match what {
+            Permission::HeedZone(zone) if zone.kind == ZoneKind::Blocked => {
+                let ahead = agv.order.nodes.iter().filter(|stop| stop.node.released);
+                let mut stops = ahead.chain(&agv.order.left.0);
+                stops.any(|stop| zone.area.contains(Point::new(stop.place.x, stop.place.y)))
+            }
+            _ => false,
+        });
+
     fault "zone-actions-left-out" ["ZONE-18", "ZACT-STATE-02", "ZINT-05"] "Does nothing of what ACTION zones ask for."
         => forbidding(|_, what| matches!(what, Permission::ActInZone(..)));
     fault "zone-exit-actions-left-out" ["ZONE-18"] "Does not do what an ACTION zone asks for at its exit."
@@ -85,6 +109,15 @@ records! {
         => forbidding(|_, what| matches!(what, Permission::ActInZone(_, Passage::Entry)));
     fault "zone-actions-inside-left-out" ["ZONE-18"] "Does not do what an ACTION zone asks for while it is inside."
         => forbidding(|_, what| matches!(what, Permission::ActInZone(_, Passage::During)));
+    fault "zone-exit-actions-on-entry" ["ZONE-18"] "Does everything that an ACTION zone asks for when it goes in, also what is meant for its exit." because "The observation of ZONE-18 makes a wrong moment a warning."
+        => when(Event::ZoneSetStored, |agv| {
+            for zone in agv.zone_sets.all.last_mut().into_iter().flat_map(|set| &mut set.zones) {
+                if let ZoneKind::Action { entry, during, exit } = &mut zone.kind {
+                    entry.append(during);
+                    entry.append(exit);
+                }
+            }
+        });
     fault "only-one-action-zone-heeded" ["ZINT-05"] "Of overlapping ACTION zones it does what one of them asks for."
         => forbidding(|agv, what| match what {
             Permission::ActInZone(zone, _) => agv.heeding.inside.iter().any(|(_, other)| {
@@ -95,6 +128,16 @@ records! {
     fault "zone-actions-among-those-of-the-order" ["IACT-STATE-03", "ZACT-STATE-02"] "Lists actions of zones in actionStates as well."
         => state(|_, words| {
             let of_zones = words.get("zoneActionStates").and_then(Value::as_array).cloned().unwrap_or_default();
+            words.change("actionStates", |all| if let Value::Array(all) = all {
+                all.extend(of_zones);
+            });
+        });
+    fault "zone-actions-in-the-list-of-the-order" ["IACT-STATE-03", "ZACT-STATE-02"] "Lists actions of zones in actionStates, and leaves their own list empty."
+        => state(|_, words| {
+            let of_zones = words.get("zoneActionStates").and_then(Value::as_array).cloned().unwrap_or_default();
+            if !of_zones.is_empty() {
+                words.set("zoneActionStates", json!([]));
+            }
             words.change("actionStates", |all| if let Value::Array(all) = all {
                 all.extend(of_zones);
             });
@@ -113,7 +156,7 @@ records! {
             }
             true
         });
-    fault "zone-actions-not-listed" ["ZACT-STATE-01", "ZACT-STATE-02"] "Has no list of the actions of zones."
+    fault "zone-actions-not-listed" ["ZACT-STATE-01", "ZACT-STATE-02", "STATE-09"] "Has no list of the actions of zones."
         => state(|_, words| {
             words.remove("zoneActionStates");
         });
@@ -202,4 +245,90 @@ records! {
             let listed = agv.errors.active.iter().any(|error| error.error_type == *name);
             (listed && relation == Relation::New).then(|| Refusal::new(Rule::OtherOrderActive, "a node was out of reach"))
         });
+
+    tolerance "zone-actions-planned-ahead" ["ZACT-STATE-06"] "It lists what the ACTION zone asks for that comes next on its way as WAITING before it is there."
+        => state(|agv, words| {
+            let planned = planned_actions(agv);
+            words.change("zoneActionStates", |all| if let Value::Array(all) = all {
+                all.extend(planned);
+            });
+        });
+}
+
+/// Its poses on the way that is left, straight from node to node.
+fn poses_ahead(agv: &Agv) -> Vec<Pose> {
+    let mut here = agv.motion.pose(agv.moment());
+    let mut poses = Vec::new();
+    for stop in agv.order.nodes.iter().filter(|stop| stop.node.released) {
+        let (x, y) = (stop.place.x - here.x, stop.place.y - here.y);
+        let length = x.hypot(y);
+        let theta = if length > 1e-6 { y.atan2(x) } else { here.theta };
+        let mut made = 0.0;
+        while made < length && poses.len() < 1_000 {
+            let share = made / length;
+            poses.push(Pose {
+                x: here.x + x * share,
+                y: here.y + y * share,
+                theta,
+                map_id: here.map_id.clone(),
+            });
+            made += 0.1;
+        }
+        here = Pose {
+            x: stop.place.x,
+            y: stop.place.y,
+            theta,
+            map_id: stop.place.map_id.clone(),
+        };
+        poses.push(here.clone());
+    }
+    poses
+}
+
+/// The states of the actions that it will do next because of a zone, where that is certain: none where zones of other kinds
+/// or several ACTION zones are in the way.
+fn planned_actions(agv: &Agv) -> Vec<Value> {
+    let is_on_its_way =
+        !agv.order.cancelled && agv.order.cancel.is_none() && !agv.order.unreachable && agv.mode.takes_orders();
+    if !is_on_its_way || !agv.config.heeds("ACTION") {
+        return Vec::new();
+    }
+    let acts = |zone: &&Zone| matches!(zone.kind, ZoneKind::Action { .. });
+    let here: Vec<&Zone> = agv.heeding.inside.iter().map(|(_, zone)| zone).filter(acts).collect();
+    let mut comes: Option<Vec<&ActionRequest>> = None;
+    for pose in poses_ahead(agv) {
+        let there: Vec<&Zone> = agv.zones_at(&pose).into_iter().map(|(_, zone)| zone).collect();
+        comes = match (here.as_slice(), there.as_slice()) {
+            ([zone], []) => exit_actions(zone),
+            ([], [zone]) => entry_actions(zone),
+            ([], []) => continue,
+            ([zone], [other]) if zone == other => continue,
+            _ => None,
+        };
+        break;
+    }
+    let states = comes
+        .unwrap_or_default()
+        .into_iter()
+        .zip(agv.heeding.actions.wrapping_add(1)..);
+    let states = states.map(|(action, number)| {
+        json!({ "actionId": format!("zone-action-{number}"), "actionType": action.action_type, "actionStatus": "WAITING" })
+    });
+    states.collect()
+}
+
+/// What an ACTION zone asks for at its exit.
+fn exit_actions(zone: &Zone) -> Option<Vec<&ActionRequest>> {
+    match &zone.kind {
+        ZoneKind::Action { exit, .. } => Some(exit.iter().collect()),
+        _ => None,
+    }
+}
+
+/// What an ACTION zone asks for from its entry on.
+fn entry_actions(zone: &Zone) -> Option<Vec<&ActionRequest>> {
+    match &zone.kind {
+        ZoneKind::Action { entry, during, exit } => Some(entry.iter().chain(during).chain(exit).collect()),
+        _ => None,
+    }
 }

@@ -20,6 +20,16 @@ records! {
         => curve(|c| c.each("controlPoints", |point| point.unset("weight")));
     tolerance "equal-weights-of-two" ["ORD-MSG-28"] "It gives all control points of a trajectory the weight 2."
         => curve(|c| c.each("controlPoints", |point| point.set("weight", 2.0)));
+    tolerance "curves-of-points-only" ["ORD-MSG-28", "ORD-MSG-31"] "A trajectory is no more than its control points where the version has defaults for the rest."
+        => composing(|_, vehicle, _, m| if vehicle.config.has("trajectoryDefaults") {
+            m.each("edges", |edge| edge.part("trajectory", |curve| {
+                if curve.get("degree") == Some(&json!(1)) && curve.list("controlPoints").len() == 2 {
+                    curve.unset("degree");
+                    curve.unset("knotVector");
+                    curve.each("controlPoints", |point| point.unset("weight"));
+                }
+            }));
+        });
     fault "curve-beside-nodes" ["ORD-MSG-30"] "Sends trajectories that lie three metres beside their nodes."
         => curve(|c| c.each("controlPoints", |point| ["x", "y"].iter().for_each(|axis| shift(point, axis, 3.0))));
     fault "corridor-apart" ["CORR-04", "ORD-MSG-30"] "Lets every corridor begin beside the end of the one before."
@@ -71,6 +81,8 @@ records! {
         => corridor(|c| c.unset("leftWidth"));
     fault "corridor-point-unknown" ["CORR-09", "JSON-02"] "Names the reference point of corridors with an underscore."
         => corridor(|c| c.set("corridorRefPoint", "KINEMATIC_CENTER"));
+    fault "corridor-point-in-words" ["CORR-09", "JSON-02"] "Names the reference point of corridors in words."
+        => corridor(|c| c.set("corridorRefPoint", "kinematic centre"));
     fault "corridor-widths-as-text" ["CORR-09", "JSON-06", "JSON-10"] "leftWidth and rightWidth of a corridor are strings."
         => corridor(|c| for key in ["leftWidth", "rightWidth"] { c.change(key, |width| *width = json!(width.as_f64().unwrap_or_default().to_string())); });
     fault "corridor-as-one-width" ["CORR-09", "JSON-10"] "It gives a corridor one member width instead of leftWidth and rightWidth."

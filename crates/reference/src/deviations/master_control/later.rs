@@ -36,6 +36,19 @@ records! {
         => position(|p| p.change("allowedDeviationXY", |allowed| if let Some(radius) = allowed.as_f64() {
             *allowed = json!({ "a": radius, "b": radius * 2.0, "theta": 0.0 });
         }));
+    fault "ellipse-without-direction" ["ORD-MSG-09"] "allowedDeviationXY has half axes and no theta."
+        => elliptic(json!({ "a": 0.4, "b": 0.2 }));
+    fault "ellipse-in-degrees" ["ORD-MSG-09"] "The theta of allowedDeviationXY is in degrees."
+        because "The document gives no range for it; the ruling of ORD-MSG-09 makes what the schema excludes a warning."
+        => elliptic(json!({ "a": 0.4, "b": 0.2, "theta": 90.0 }));
+    fault "deviation-as-plain-number" ["ORD-MSG-09"] "allowedDeviationXY is a number, as in 2.x, and no ellipse."
+        => writing("order", |text| {
+            let Ok(mut message) = serde_json::from_slice::<Value>(text) else { return };
+            let nodes = message["nodes"].as_array_mut().into_iter().flatten();
+            let positions = nodes.filter_map(|node| node.get_mut("nodePosition")?.as_object_mut());
+            positions.for_each(|place| place.change("allowedDeviationXY", |allowed| if let Some(radius) = allowed.get("a").cloned() { *allowed = radius; }));
+            *text = message.to_string().into_bytes();
+        });
     fault "orders-to-the-sleeping" ["HIB-13"] "It sends orders to a vehicle that sleeps."
         => letting(|_, vehicle, what| asleep(vehicle) && matches!(what, Permission::Reach));
     fault "actions-to-the-sleeping" ["HIB-13"] "It sends instant actions to a vehicle that sleeps, as to one that is awake."
@@ -56,6 +69,14 @@ records! {
     fault "lists-never-cleared" ["IACT-STATE-07"] "It never has the list of instant actions cleared."
         because "IACT-STATE-07 is a recommendation."
         => forbidding(|_, _, what| matches!(what, Permission::Clear("clearInstantActions")));
+    fault "zone-lists-never-cleared" ["ZACT-STATE-08"] "It never has the list of actions in zones cleared."
+        because "ZACT-STATE-08 is a recommendation."
+        => forbidding(|_, _, what| matches!(what, Permission::Clear("clearZoneActions")));
+    fault "position-under-its-old-name" ["ACT-08", "FACT-15"] "It calls initializePosition by the name of earlier versions, initPosition."
+        => writing("instantActions", |text| {
+            let old = String::from_utf8_lossy(text).replace("initializePosition", "initPosition");
+            *text = old.into_bytes();
+        });
     fault "certificate-over-http" ["CERT-05"] "The links of updateCertificate are without TLS."
         => parameter(|kind, p| if kind == "updateCertificate" {
             p.change("value", |link| *link = json!(link.as_str().unwrap_or_default().replace("https:", "http:")));
@@ -73,6 +94,19 @@ records! {
         });
     fault "skip-names-another-action" ["RETRY-08"] "skipRetry names an action that there is not."
         => typed("skipRetry", |a| a.each("actionParameters", |parameter| parameter.set("value", "action-0")));
+    fault "retry-of-what-has-failed-for-good" ["RETRY-08"] "It sends retry for an action that is FAILED and cannot be tried again."
+        => keep::<BTreeSet<String>>().happens(|tried, site, vehicle, event| if let Event::State(_) = event {
+            let Some((state, running)) = vehicle.state.as_ref().zip(vehicle.running.as_ref()) else { return };
+            let failed = |id: &&str| state.action(id).is_some_and(|action| action.action_status == "FAILED");
+            let failed: Vec<String> = running.action_ids().filter(failed).map(str::to_owned).collect();
+            for id in failed {
+                if tried.insert(id.clone()) { site.instant(vehicle, "retry", &json!({ "actionId": id })); }
+            }
+        });
+    fault "fleet-trigger-called-host" ["TRIG-03", "ACT-31"] "It calls its own trigger HOST, and writes that as a text and not as a list."
+        => parameter_of("triggerType", |p| p.change("value", |value| {
+            if value.as_array().is_some_and(|types| types.contains(&json!("FLEET_CONTROL"))) { *value = json!("HOST"); }
+        }));
     fault "trigger-type-as-text" ["ACT-31", "BP-05", "FACT-15"] "triggerType is a text and not a list of texts."
         => parameter_of("triggerType", |p| p.change("value", |value| if let Some(first) = value.get(0).cloned() { *value = first; }));
     fault "trigger-type-in-its-own-words" ["TRIG-03"] "It calls its own trigger FLEET and that at the vehicle BUTTON."
@@ -125,6 +159,20 @@ fn naming_in(kind: &'static str, key: &'static str, change: fn(&Value) -> Value)
                 });
             }
         });
+        true
+    })
+}
+
+/// Says where a vehicle may be beside a node by this ellipse, where a version has ellipses.
+fn elliptic(ellipse: Value) -> Box<dyn Deviation> {
+    holding(ellipse).sends(|ellipse, _, vehicle, outgoing| {
+        if vehicle.config.has("requests") {
+            outgoing.message.each("nodes", |node| {
+                node.part("nodePosition", |place| {
+                    place.change("allowedDeviationXY", |allowed| *allowed = ellipse.clone())
+                });
+            });
+        }
         true
     })
 }

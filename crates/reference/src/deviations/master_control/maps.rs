@@ -129,6 +129,29 @@ records! {
             let free = vehicle.running.is_none() && !vehicle.enabling.contains_key(&map.map_id);
             if !enabled && free && let Some(id) = site.map_action(vehicle, "enableMap", &map.map_id, &map.map_version) { vehicle.enabling.insert(map.map_id, id); }
         });
+    tolerance "enables-on-nodes" ["ACT-08", "MAP-36"] "It has maps and sets of zones enabled by an action of an order, where the vehicle offers that and has nothing to do."
+        => keep::<BTreeSet<String>>().asked(|_, site, vehicle, command, arguments| {
+            let here = node_at_rest(site, vehicle, "enableMap").filter(|_| command == "enable-map");
+            let Some(to) = here else { return true };
+            let given = json!({ "mapId": arguments["mapId"], "mapVersion": arguments["mapVersion"] });
+            site.dispatch(vehicle, Transport { to, action: Some("enableMap".into()), parameters: given, ..Transport::default() });
+            false
+        }).happens(|asked, site, vehicle, event| if let Event::Looked = event {
+            let wanted = vehicle.zone_sets.iter().find(|set| vehicle.zone_set_status(&set.id) == Some("DISABLED"));
+            let Some(id) = wanted.map(|set| set.id.clone()).filter(|id| !asked.contains(id)) else { return };
+            let Some(to) = node_at_rest(site, vehicle, "enableZoneSet") else { return };
+            asked.insert(id.clone());
+            let given = json!({ "zoneSetId": id });
+            vehicle.queue.push_front(Transport { to, action: Some("enableZoneSet".into()), parameters: given, ..Transport::default() });
+        }).allows(|_, _, vehicle, what, usual| {
+            let enables = |transport: &Transport| transport.action.as_deref() == Some("enableZoneSet");
+            let waits = vehicle.queue.front().is_some_and(enables);
+            match what {
+                Permission::EnableZones => usual && !waits && !vehicle.running.as_ref().is_some_and(|running| enables(&running.transport)),
+                Permission::ZonesReady => usual || waits,
+                _ => usual,
+            }
+        });
     tolerance "preloads-maps" ["MAP-10", "MAP-16"] "It sends downloadMap unasked for each map of the site that the vehicle does not have."
         => looked(|site, vehicle| if site.commandable(vehicle) {
             for map in site.config.maps.clone() {
@@ -140,7 +163,9 @@ records! {
     tolerance "enables-map-before-each-order" ["MAP-09"] "It sends enableMap for the map of the first node before every order, even if it is enabled."
         => happening(|site, vehicle, event| if let Event::Begins(running) = event {
             let map_id = running.stops[0].map_id.clone();
-            if let Some(version) = enabled_version(vehicle, &map_id) {
+            // A map has a name and a version.
+            let fits = site.most(vehicle, Measure::Parameters, "actions.actionsParameters") >= 2;
+            if let Some(version) = enabled_version(vehicle, &map_id).filter(|_| fits) {
                 site.map_action(vehicle, "enableMap", &map_id, &version);
                 site.send_instants(vehicle);
             }
@@ -233,4 +258,12 @@ fn link(action: &mut Object, written: fn(&str) -> String) {
             parameter.set("value", written(parameter.text("value")));
         }
     });
+}
+
+/// The node of the layout where a vehicle with nothing to do can be given an action.
+fn node_at_rest(site: &Site, vehicle: &Vehicle, kind: &str) -> Option<String> {
+    let state = vehicle.state.as_ref().filter(|state| state.route_empty())?;
+    let rests = vehicle.running.is_none() && vehicle.cancel.is_none() && site.commandable(vehicle);
+    let here = site.config.node(&state.last_node_id).map(|node| node.id.clone());
+    here.filter(|_| rests && site.offers(vehicle, kind, "NODE"))
 }

@@ -41,6 +41,8 @@ records! {
             e.set("orientation", 0.0);
             e.set("orientationType", "TANGENTIAL");
         });
+    fault "rotation-speed-and-trajectory-unasked" ["OPT-03"] "All edges carry maxRotationSpeed and a trajectory, whether the vehicle supports them or not."
+        => filling(|_, field, value| if matches!(field.name, "order.edges.maxRotationSpeed" | "order.edges.trajectory") { value.get_or_insert(field.default.clone()); });
     fault "speed-unasked-in-updates" ["OPT-03"] "Order updates carry maxSpeed on every edge, also for a vehicle that does not support it."
         => update(|m| m.each("edges", |edge| edge.supply("maxSpeed", json!(1.0))));
     fault "start-deviation-unasked" ["OPT-03"]

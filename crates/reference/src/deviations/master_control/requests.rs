@@ -15,6 +15,57 @@ records! {
             let others = site.claims.all.iter().filter(|other| other.whose == name && other.id != claim.id);
             usual.filter(|_| others.into_iter().all(|other| other.said.is_none()))
         });
+    fault "later-vehicle-never-answered" ["REQ-03"] "It says nothing to a vehicle that asks for a zone which another one has, then and later."
+        => fleet::<BTreeSet<String>>().decides(|unheard, site, vehicle, claim, usual| {
+            let key = format!("{} {}", vehicle.name(), claim.id);
+            let held = site.claims.all.iter().any(|other| other.whose != claim.whose && is_zone(other) && other.holds());
+            if is_zone(claim) && claim.said.is_none() && held && usual == Some(Grant::Queued) { unheard.insert(key.clone()); }
+            usual.filter(|_| !unheard.contains(&key))
+        });
+    fault "requests-of-the-first-vehicle-only" ["REQ-03"] "It answers requests of the first vehicle of its fleet only."
+        => deciding(|site, vehicle, _, usual| {
+            let first = site.config.vehicles.first().map(|first| &first.serial_number);
+            usual.filter(|_| first == Some(&vehicle.config.serial_number))
+        });
+    fault "asked-again-unanswered" ["REQ-03"] "It answers the first request of a vehicle for a zone, and no later one for the same zone."
+        => keep::<BTreeMap<String, String>>().decides(|known, _, _, claim, usual| {
+            let Wish::Zone { zone_id, .. } = &claim.wish else { return usual };
+            let first = known.entry(zone_id.clone()).or_insert_with(|| claim.id.clone());
+            usual.filter(|_| *first == claim.id)
+        });
+    fault "requests-unanswered-after-return" ["REQ-03"] "It answers no request of a vehicle that has come ONLINE again."
+        => keep::<bool>().happens(|back, _, _, event| if let Event::Online(Presence::Away) = event { *back = true; })
+            .decides(|back, _, _, _, usual| usual.filter(|_| !*back));
+    fault "requests-unanswered-after-a-cut" ["REQ-03"] "It answers no request any more once its own connection was lost."
+        => keep::<bool>().happens(|cut, _, _, event| if let Event::Connected(true) = event { *cut = true; })
+            .decides(|cut, _, _, _, usual| usual.filter(|_| !*cut));
+    fault "responses-to-the-first-vehicle" ["REQ-03"] "It publishes responses to any vehicle on the topic of the first vehicle of its fleet."
+        => sending(|site, _, out| if out.name == "responses" {
+            let first = site.config.vehicles.first().and_then(|first| first.topics.get("responses"));
+            first.into_iter().for_each(|topic| out.topic.clone_from(topic));
+        });
+    fault "answers-under-the-first-id" ["REQ-03", "REQ-04"] "It answers every request of a vehicle under the requestId of the first one."
+        => keep::<Option<String>>().sends(|first, _, _, outgoing| {
+            outgoing.message.each("responses", |answer| {
+                let id = first.get_or_insert_with(|| answer.text("requestId").to_owned()).clone();
+                answer.set("requestId", id);
+            });
+            true
+        });
+    fault "queued-for-ever" ["REQ-03"] "A request that it has queued it never grants."
+        because "To be queued is an answer, and no time is given for the next one."
+        => deciding(|_, _, claim, usual| usual.map(|grant| if claim.said == Some(Grant::Queued) { Grant::Queued } else { grant }));
+    fault "zone-never-free-again" ["REQ-03", "ZREQ-18"] "A zone that was granted once stays occupied, also when the vehicle has given it back."
+        because "Who waits for it has been answered, and no time is given for the next answer."
+        => fleet::<BTreeMap<String, String>>().decides(|taken, _, vehicle, claim, usual| {
+            let Wish::Zone { zone_id, .. } = &claim.wish else { return usual };
+            let name = vehicle.name();
+            if usual == Some(Grant::Granted) && claim.said != Some(Grant::Granted) {
+                let whose = taken.entry(zone_id.clone()).or_insert_with(|| name.clone());
+                if *whose != name { return Some(Grant::Queued); }
+            }
+            usual
+        });
     fault "response-type-for-grant-type" ["REQ-04"] "It calls the grantType of a response responseType."
         => response(|answer| answer.rename("grantType", "responseType"));
     fault "grant-type-in-other-words" ["REQ-04"] "It answers with ACCEPTED where it grants something."
@@ -28,8 +79,8 @@ records! {
             let granted = m.list("responses").iter().find(|answer| answer["grantType"] == "GRANTED").map(|answer| answer["requestId"].clone());
             if let Some(id) = granted { m.add("responses", json!({ "requestId": id, "grantType": "QUEUED" })) }
         });
-    fault "lease-of-what-is-not-granted" ["REQ-05"] "It says until when a request that is queued is valid."
-        => response(|answer| if answer.says("grantType", "QUEUED") { answer.set("leaseExpiry", "2099-01-01T00:00:00.000Z") });
+    fault "lease-of-what-is-not-granted" ["REQ-05"] "It says until when a request is valid that is queued or rejected."
+        => response(|answer| if answer.says("grantType", "QUEUED") || answer.says("grantType", "REJECTED") { answer.set("leaseExpiry", "2099-01-01T00:00:00.000Z") });
     fault "lease-in-seconds" ["REQ-05"] "leaseExpiry is a number of seconds."
         => response(|answer| answer.change("leaseExpiry", |end| *end = json!(20)));
     fault "lease-in-local-time" ["REQ-05"] "leaseExpiry is in local time, two hours ahead, and says so."
@@ -41,7 +92,7 @@ records! {
             outgoing.message.each("responses", |answer| answer.change("leaseExpiry", |end| *end = json!(format!("{over:.3}"))));
             true
         });
-    fault "lease-prolonged-under-another-id" ["REQ-11"] "It prolongs a lease by a response with a requestId of its own."
+    fault "lease-prolonged-under-another-id" ["REQ-11"] "It prolongs a lease by a response with a requestId of its own." because "To prolong a lease is a permission, so that what is said about it is remarked on."
         => fleet::<BTreeSet<String>>().sends(|granted, _, _, outgoing| {
             outgoing.message.each("responses", |answer| {
                 let id = answer.text("requestId").to_owned();
@@ -82,6 +133,26 @@ records! {
             }
             _ => usual,
         });
+    tolerance "granted-a-minute-and-a-half-later" ["REQ-03", "REQ-04"] "Every request is queued at once and granted 90 s later."
+        => deciding(|site, vehicle, claim, usual| match (claim.said, usual) {
+            (None, Some(Grant::Granted)) => {
+                vehicle.at(site.now.moment + Duration::from_secs(90));
+                Some(Grant::Queued)
+            }
+            (Some(Grant::Queued), Some(Grant::Granted)) => {
+                let due = claim.said_at + Duration::from_secs(90);
+                if due > site.now.moment { vehicle.at(due); }
+                Some(if due > site.now.moment { Grant::Queued } else { Grant::Granted })
+            }
+            _ => usual,
+        });
+    tolerance "lease-of-15-s-prolonged-every-5-s" ["REQ-11", "REQ-05"] "It grants for 15 s and prolongs that every 5 s."
+        => plain().lasts(|(), _, _, what, usual| if matches!(what, Span::Lease) { Duration::from_secs(10) } else { usual })
+            .sends(|(), site, _, outgoing| {
+                let until = site.now.utc.checked_add(Duration::from_secs(15)).unwrap_or(site.now.utc);
+                outgoing.message.each("responses", |answer| answer.change("leaseExpiry", |end| *end = json!(format!("{until:.3}"))));
+                true
+            });
     tolerance "corridors-of-the-horizon-refused" ["CORR-22"] "It rejects requests for corridors of edges that are not released."
         => deciding(|_, _, claim, usual| match usual {
             Some(Grant::Queued) if !is_zone(claim) => Some(Grant::Rejected),

@@ -51,6 +51,15 @@ records! {
                 });
             }
         });
+    fault "starts-at-its-home-node" ["ORD-03"] "It begins every order where the first order of the vehicle began, wherever the vehicle is now."
+        => keep::<(Option<String>, Option<String>)>().happens(|(home, planned), _, _, event| match event {
+            Event::Planned(running) => *planned = running.stops.first().map(|first| first.id.clone()),
+            Event::Begun => *home = home.take().or_else(|| planned.take()),
+            _ => {}
+        }).stands(|(home, _), site, _, pose, _| if let Some(home) = home.as_ref().filter(|home| site.config.node(home).is_some()) {
+            pose.node.clone_from(home);
+            pose.position = None;
+        });
     fault "start-before-manual" ["ORD-03"] "After a time in manual mode the next order begins where the vehicle was when it was taken over, not where it is."
         => keep::<Option<(String, Option<Position>)>>().happens(|before_manual, _, vehicle, event| match event {
             Event::State(Some(before)) if before.takes_orders() && !takes_orders(vehicle) => {

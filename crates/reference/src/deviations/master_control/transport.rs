@@ -95,9 +95,18 @@ records! {
     fault "order-qos-1" ["MQTT-06"] "Publishes orders with QoS 1."
         because "A higher QoS delivers the order as well; the ruling of MQTT-06 is a warning."
         => sending(|_, _, out| qos(out, 1, out.name == "order"));
+    fault "instant-actions-and-responses-qos-one" ["MQTT-06"] "It publishes orders with QoS 0, but instant actions and responses with QoS 1."
+        because "A higher QoS delivers the messages as well; the ruling of MQTT-06 is a warning."
+        => sending(|_, _, out| qos(out, 1, matches!(out.name, "instantActions" | "responses")));
     fault "instant-actions-qos-2" ["MQTT-06"] "Publishes instant actions with QoS 2."
         because "A higher QoS delivers the actions as well; the ruling of MQTT-06 is a warning."
         => sending(|_, _, out| qos(out, 2, out.name == "instantActions"));
+    fault "responses-qos-one" ["MQTT-06"] "It publishes responses with QoS 1."
+        because "A higher QoS delivers the responses as well; the ruling of MQTT-06 is a warning."
+        => sending(|_, _, out| qos(out, 1, out.name == "responses"));
+    fault "zone-sets-qos-one" ["MQTT-06"] "It publishes sets of zones with QoS 1."
+        because "A higher QoS delivers the sets as well; the ruling of MQTT-06 is a warning."
+        => sending(|_, _, out| qos(out, 1, out.name == "zoneSet"));
     fault "cancel-qos-one" ["MQTT-06"] "It publishes instantActions with cancelOrder with QoS 1."
         because "The ruling of MQTT-06 makes a higher quality of service a warning: a cancelOrder with QoS 1 harms nobody."
         => sending(|_, _, out| qos(out, 1, out.tells(&["cancelOrder"])));
@@ -120,6 +129,8 @@ records! {
         => instants_on(|_, topic| topic.replace("instantActions", "instant_actions"));
     fault "instant-topic-lower-case" ["TOPIC-01", "TOPIC-13"] "It publishes instant actions on a topic that ends with instantactions in lower case."
         => instants_on(|_, topic| topic.replace("instantActions", "instantactions"));
+    fault "responses-topic-in-singular" ["TOPIC-01", "REQ-03"] "It publishes responses on a topic that ends with response."
+        => misdirected("responses", |_, topic| topic.replace("/responses", "/response"));
     fault "version-level-without-letter" ["TOPIC-03", "TOPIC-13"] "It publishes instantActions under a major version level without the letter v."
         => instants_on(|_, topic| topic.replacen("/v", "/", 1));
     fault "topic-levels-swapped" ["TOPIC-04", "TOPIC-02", "TOPIC-13"] "It publishes instantActions with the levels of manufacturer and serial number swapped."

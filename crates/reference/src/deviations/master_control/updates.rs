@@ -1,5 +1,7 @@
 //! Deviations of what updates of an order say: numbers, stitching node, what was sent before (section 6.6.2).
 
+use crate::master_control::commands::transport;
+
 use super::prelude::*;
 
 records! {
@@ -8,7 +10,7 @@ records! {
             .allows(|_, _, _, what, usual| usual && !matches!(what, Permission::Gone));
     fault "update-id-kept" ["ORD-UPD-04"] "Does not raise orderUpdateId."
         => order(|m| m.set("orderUpdateId", 0));
-    fault "update-id-falls" ["ORD-UPD-04"] "Counts orderUpdateId down."
+    fault "update-id-falls" ["ORD-UPD-04", "ORD-UPD-14"] "Counts orderUpdateId down."
         => order(|m| m.set("orderUpdateId", 1000_u64.saturating_sub(m["orderUpdateId"].as_u64().unwrap_or_default())));
     fault "stitching-missing" ["ORD-UPD-05"] "Begins updates with the first new node."
         => update(|m| for list in ["nodes", "edges"] {
@@ -18,6 +20,30 @@ records! {
         => stitching(|node, _| node.part("nodePosition", |place| shift(place, "x", 0.3)));
     fault "stitching-action-added" ["ORD-UPD-06", "ORD-UPD-15"] "Adds an action to the stitching node."
         => stitching(|node, id| node.add("actions", json!({ "actionType": "beep", "actionId": id, "blockingType": "NONE" })));
+    fault "stitching-node-without-actions" ["ORD-UPD-06"] "The stitching node of an update has no actions, also where it had some before."
+        => stitching(|node, _| node.set("actions", json!([])));
+    fault "further-action-on-the-stitching-node" ["ORD-UPD-15", "ORD-UPD-06"]
+        "What is to be done besides where the vehicle waits at the end of its base it adds to the actions of the stitching node, and sends no further node."
+        => asked("dispatch", |site, vehicle, arguments| {
+            let Some(action) = further_action(site, vehicle, arguments) else { return true };
+            let running = vehicle.running.as_mut();
+            running.into_iter().for_each(|running| {
+                if let Some(end) = running.stops.get_mut(running.released.saturating_sub(1)) { end.actions.push(action.clone()); }
+                running.changed = true;
+            });
+            vehicle.at(site.now.moment);
+            false
+        });
+    tolerance "further-actions-on-a-further-node" ["ORD-UPD-15"]
+        "What is to be done besides where the base of an order ends it puts on a further node of the same id at the same place."
+        => further_node();
+    fault "further-node-with-the-same-number" ["ORD-UPD-11", "ORD-UPD-12"]
+        "What is to be done besides where the base ends it puts on a further node that has the sequenceId of the stitching node."
+        => further_node().words(|(), _, _, worded, m| {
+            let first = worded.window.first;
+            let stays = worded.running.stops.get(first).zip(worded.running.stops.get(first + 1)).is_some_and(|(end, next)| end.id == next.id);
+            if worded.is_update() && stays { worded.nodes(m, |index, _, node| if index == first + 1 { node.set("sequenceId", 2 * first); }); }
+        });
     fault "stitching-actions-renamed" ["ORD-UPD-06"] "The actions of the stitching node have other actionIds in an order update than before."
         => stitching(|node, id| node.each("actions", |action| action.set("actionId", format!("{}-{id}", action.text("actionId")))));
     fault "stitching-deviation-widened" ["ORD-UPD-06", "OPT-03"] "The stitching node has an allowedDeviationXY of 1 m in order updates, whatever it had before."
@@ -121,4 +147,80 @@ fn numbered_by_node() -> Box<Hooks<()>> {
             node.set("sequenceId", 2 * first.unwrap_or_default());
         })
     })
+}
+
+/// An action that is asked for where the vehicle waits at the end of the base of its order.
+fn further_action(site: &mut Site, vehicle: &Vehicle, arguments: &Value) -> Option<Value> {
+    let transport = transport(vehicle, arguments).filter(|transport| transport.from.is_none())?;
+    let kind = transport.action.as_deref()?;
+    let running = vehicle
+        .running
+        .as_ref()
+        .filter(|running| running.confirmed && !running.is_whole())?;
+    let state = vehicle.state.as_ref().filter(|_| vehicle.cancel.is_none())?;
+    let end = running.stops.get(running.released.checked_sub(1)?)?;
+    let waits =
+        !state.node_states.iter().any(|node| node.released) && running.reached(Some(state)) + 1 == running.released;
+    if !waits || end.id != transport.to || !site.offers(vehicle, kind, "NODE") {
+        return None;
+    }
+    Some(site.action(vehicle, kind, &transport.parameters))
+}
+
+/// Leads the way behind the base to a further node at the same place, where something is done.
+fn stay(running: &mut Running, way: String, actions: Vec<Value>) {
+    let base = running.released;
+    let Some(end) = base.checked_sub(1).and_then(|last| running.stops.get(last)) else {
+        return;
+    };
+    let leg = Leg {
+        id: way,
+        from: end.id.clone(),
+        to: end.id.clone(),
+        ..Leg::default()
+    };
+    let stop = Stop { actions, ..end.clone() };
+    running.stops.insert(base, stop);
+    running.legs.insert(base - 1, leg);
+    running.changed = true;
+}
+
+/// Puts what is to be done besides where the base ends on a further node.
+fn further_node() -> Box<Hooks<()>> {
+    plain()
+        .asked(|(), site, vehicle, command, arguments| {
+            if command != "dispatch" {
+                return true;
+            }
+            let Some(action) = further_action(site, vehicle, arguments) else {
+                return true;
+            };
+            let way = site.next_id(vehicle, "way");
+            vehicle
+                .running
+                .as_mut()
+                .into_iter()
+                .for_each(|running| stay(running, way.clone(), vec![action.clone()]));
+            vehicle.at(site.now.moment);
+            false
+        })
+        .happens(|(), site, vehicle, event| {
+            if let Event::NotLed(running, way, transport, done) = event
+                && way.stops.len() == 1
+            {
+                let added = std::mem::take(&mut way.stops[0].actions);
+                if added.is_empty() || running.released == 0 {
+                    return;
+                }
+                running.stops.truncate(running.released);
+                running.legs.truncate(running.released - 1);
+                let way = site.next_id(vehicle, "way");
+                stay(running, way, added);
+                running.transport = Transport {
+                    loaded: running.transport.loaded,
+                    ..transport.clone()
+                };
+                **done = true;
+            }
+        })
 }

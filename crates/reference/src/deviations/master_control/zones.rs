@@ -39,6 +39,11 @@ records! {
         });
     fault "orders-before-zones" ["ZSET-08"] "It sends an order while the zones of its map are on their way to the vehicle."
         => letting(|_, _, what| matches!(what, Permission::ZonesReady));
+    fault "zone-sets-to-the-first-vehicle" ["TOPIC-04", "HDR-05"] "It publishes sets of zones for any vehicle on the topic of the first vehicle of its fleet."
+        => sending(|site, _, out| if out.name == "zoneSet" {
+            let first = site.config.vehicles.first().and_then(|first| first.topics.get("zoneSet"));
+            first.into_iter().for_each(|topic| out.topic.clone_from(topic));
+        });
     fault "zone-ids-repeated" ["ZSET-19"] "All zones of a set have the same id."
         => zone(|zone| zone.set("zoneId", "zone"));
     fault "zone-type-unknown" ["ZSET-19"] "It writes types of zones in small letters."
@@ -101,6 +106,15 @@ records! {
         }));
     tolerance "each-set-has-its-own-id" ["ZSET-06"] "It gives each vehicle a set of its own, also where the zones are the same."
         => forbidding(|_, _, what| matches!(what, Permission::SameSet(..)));
+    tolerance "has-no-zones" ["TOPIC-17", "ZSET-25"] "It has no zones, and sends nobody any."
+        => forbidding(|_, _, what| matches!(what, Permission::GiveZones));
+    tolerance "zones-concave-and-touching" ["ZSET-22", "ZSET-24"] "The border of its zones has a notch; zones that say where to drive share a side."
+        => zone(|zone| {
+            let directed = !(zone.text("directedLimitation").is_empty() && zone.text("bidirectedLimitation").is_empty());
+            zone.change("vertices", |corners| if let Some(corners) = corners.as_array_mut() {
+                if directed { widen(corners) } else { notch(corners) }
+            });
+        });
 }
 
 /// Changes each set.
@@ -116,4 +130,26 @@ fn set(change: fn(&mut Object)) -> Box<dyn Deviation> {
 /// Moves the border of a zone to the left.
 fn move_by(zone: &mut Object, metres: f64) {
     zone.each("vertices", |corner| shift(corner, "x", -metres));
+}
+
+/// Makes a zone reach a metre to the left and to the right of its middle.
+fn widen(corners: &mut [Value]) {
+    let x = |corner: &Value| corner["x"].as_f64().unwrap_or_default();
+    let least = corners.iter().map(x).fold(f64::INFINITY, f64::min);
+    let most = corners.iter().map(x).fold(f64::NEG_INFINITY, f64::max);
+    let middle = ((least + most) * 50.0).round() / 100.0;
+    for corner in corners {
+        let side = if x(corner) < middle { -1.0 } else { 1.0 };
+        corner["x"] = json!(middle + side);
+    }
+}
+
+/// Makes a notch in the upper side of a rectangle.
+fn notch(corners: &mut Vec<Value>) {
+    let at = |corner: &Value, axis: &str| corner[axis].as_f64().unwrap_or_default();
+    if let [first, _, third, fourth] = corners.as_slice() {
+        let x = f64::midpoint(at(third, "x"), at(fourth, "x"));
+        let y = at(third, "y") - (at(third, "y") - at(first, "y")) / 4.0;
+        corners.insert(3, json!({ "x": x, "y": y }));
+    }
 }

@@ -1,0 +1,105 @@
+//! `zones/requests`: what the requests for zones in the states are about.
+
+use std::collections::BTreeSet;
+
+use crate::finding::{broken, quote};
+use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_view::{StateView, ZoneRequest};
+use tck_world::{Fact, Listen, Observation, Topic};
+
+/// `zones/requests`.
+pub(crate) const ZONE_REQUESTS: Check = Check {
+    name: "zones/requests",
+    decides: &["ZREQ-03", "ZREQ-05", "ZREQ-06"],
+    doc: "A zoneRequest that is new is for a zone set that the same state lists as ENABLED (ZREQ-03), and for a zone of that \
+          set, where it is known what is in it (ZREQ-06). Its requestType is ACCESS for a zone of type RELEASE, and REPLANNING for \
+          one of type COORDINATED_REPLANNING (ZREQ-05).",
+    arguments: &[],
+    listens: &[Listen::ToVehicle(Topic::ZoneSet), Listen::Delivered(Topic::State)],
+    reads: &[Fact::Zones],
+    needs: &[StateView::zone_requests, StateView::zone_sets],
+    start: |_| Box::new(Requests::default()),
+};
+
+/// How many requests of a state are looked at.
+const LOOKED_AT: usize = 256;
+
+#[derive(Default)]
+struct Requests {
+    /// The ids of the state before.
+    known: BTreeSet<String>,
+}
+
+/// What fleet control is asked for about a zone of a type.
+fn wanted(zone_type: &str) -> Option<&'static str> {
+    match zone_type {
+        "RELEASE" => Some("ACCESS"),
+        "COORDINATED_REPLANNING" => Some("REPLANNING"),
+        _ => None,
+    }
+}
+
+/// What is wrong with a new request.
+fn wrong(request: &ZoneRequest, state: &StateView, context: &CheckContext<'_>) -> Vec<(&'static str, String)> {
+    let id = quote(request.request_id.or_empty());
+    let Some(set) = request.zone_set_id.text() else {
+        return Vec::new();
+    };
+    let mut found = Vec::new();
+    let mut sets = state.zone_sets.iter();
+    let is_enabled = |listed: &tck_view::ZoneSetState| {
+        listed.zone_set_id.text() == Some(set) && listed.zone_set_status.is("ENABLED")
+    };
+    if state.zone_sets.is_there() && !sets.any(is_enabled) {
+        let text = format!(
+            "the request {id} is for the zone set {}, which is not ENABLED",
+            quote(set)
+        );
+        found.push(("ZREQ-03", text));
+    }
+    let (Some(zones), Some(name)) = (context.world.zones().of_set(set), request.zone_id.text()) else {
+        return found;
+    };
+    let Some(zone) = zones.iter().find(|zone| zone.name() == name) else {
+        let text = format!(
+            "the request {id} is for the zone {}, which is not in the zone set {}",
+            quote(name),
+            quote(set)
+        );
+        found.push(("ZREQ-06", text));
+        return found;
+    };
+    let zone_type = zone.zone.zone_type.or_empty();
+    let said = request.request_type.text();
+    if let (Some(wanted), Some(said)) = (wanted(zone_type), said)
+        && wanted != said
+    {
+        let text = format!(
+            "the request {id} for a zone of type {zone_type} is of type {}",
+            quote(said)
+        );
+        found.push(("ZREQ-05", text));
+    }
+    found
+}
+
+impl Running for Requests {
+    fn observe(
+        &mut self,
+        record: &Observation<'_>,
+        context: &CheckContext<'_>,
+        findings: &mut Vec<CheckFinding>,
+    ) -> bool {
+        let Some(state) = record.state() else { return false };
+        let mut now = BTreeSet::new();
+        for request in state.zone_requests.iter().take(LOOKED_AT) {
+            let Some(id) = request.request_id.text() else { continue };
+            if now.insert(id.to_owned()) && !self.known.contains(id) {
+                let found = wrong(request, state, context);
+                findings.extend(found.into_iter().map(|(id, text)| broken(id, record.seq(), text)));
+            }
+        }
+        self.known = now;
+        !self.known.is_empty()
+    }
+}
