@@ -220,6 +220,8 @@ impl MasterControl {
                 Some((_, Input::Command(name, arguments))) => self.command(&name, &arguments),
                 _ => {}
             }
+            // What one state says may be gone from the next.
+            self.look_round(now);
         }
         self.site.attempt_connection();
         self.look_round(now);
