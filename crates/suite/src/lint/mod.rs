@@ -171,6 +171,9 @@ pub(super) fn monitor(
         Rule::Never { topic, pattern } => (topic, vec![pattern]),
         Rule::Always { topic, when, pattern } => (topic, when.iter().chain([pattern]).collect()),
     };
+    for Binding { requirement, span } in &monitor.checks {
+        linter.not_permitted(requirement, span, &packs);
+    }
     let at = topic.unwrap_or(&places.start);
     if !linter.observed_topic(name, &packs, at) {
         return;
@@ -399,6 +402,21 @@ impl<'a> Linter<'a> {
     }
 
     /// The packs out of `packs` that have the requirement.
+    /// Refuses a clause on what is a permission in one of these versions.
+    fn not_permitted(&mut self, id: &RequirementId, at: &Span, packs: &[usize]) {
+        let permitting = self.vocabulary.requirement(id.as_str()).map(|facts| facts.permitting);
+        let versions = self.vocabulary.versions();
+        let permits = permitting.into_iter().flatten().find(|pack| packs.contains(pack));
+        if let Some(version) = permits.and_then(|pack| versions.get(pack)) {
+            let title = format!("`{id}` is a permission in {version}, and a permission cannot be broken");
+            self.problems.add(
+                Diagnostic::new("permission-judged", at.clone(), title, "this would always pass").hint(
+                    "write `prefers:` or `prefer:` where the catalogue asks for a warning, or take this out of that version by `spec:`",
+                ),
+            );
+        }
+    }
+
     fn requirement(&mut self, id: &RequirementId, at: &Span, packs: &[usize]) -> Vec<usize> {
         let Some(facts) = self.vocabulary.requirement(id.as_str()) else {
             let ids = self.vocabulary.requirements();

@@ -3,11 +3,11 @@
 use super::paths::Topic;
 use super::scope::Scope;
 use super::{Linter, within};
-use crate::model::{Binding, Extent, Patch, Path, Section, Send, Step, VehicleStep, Verb, Walk, Which};
+use crate::model::{Binding, Extent, Patch, Path, Section, Selection, Send, Step, VehicleStep, Verb, Walk, Which};
 use tck_base::diagnostic::{Diagnostic, Span};
 use tck_base::pattern::{Term, TermKind};
 use tck_journal::event::LinkFault;
-use tck_pack::Role;
+use tck_pack::{RequirementId, Role};
 use tck_profile::{VEHICLE_WORDS, find_vehicle_word};
 
 /// Where the first requirement of a clause is written.
@@ -20,6 +20,7 @@ impl Linter<'_> {
         if section != Section::Steps {
             self.must_not_decide(step, section);
         }
+        self.can_be_broken(step, packs);
         let at = &step.verb_span;
         match &*step.verb {
             Verb::Send(send) => self.send(send, packs, at),
@@ -96,6 +97,49 @@ impl Linter<'_> {
             Verb::Operator(operator) => self.operator(operator, at),
             Verb::Vehicle(vehicle) => self.vehicle(vehicle, step),
             Verb::Serve(_) => {}
+        }
+    }
+
+    /// Nothing breaks a permission: a picture that is bound to one would pass whatever comes. A named check says by itself
+    /// what it remarks on.
+    fn can_be_broken(&mut self, step: &Step, packs: &[usize]) {
+        let named = |selection: &Selection| selection.check.is_some();
+        let mut bound: Vec<(&RequirementId, &Span)> = Vec::new();
+        let mut bind = |bindings: &[Binding], selection: Option<&Selection>| {
+            if !step.prefers && !selection.is_some_and(named) {
+                bound.extend(bindings.iter().map(|one| (&one.requirement, &one.span)));
+            }
+        };
+        let asserted = match &*step.verb {
+            Verb::Expect(expect) => {
+                bind(&expect.checks, Some(&expect.selection));
+                &expect.assert[..]
+            }
+            Verb::Never(never) => {
+                bind(&never.checks, Some(&never.selection));
+                &[]
+            }
+            Verb::Always(always) => {
+                bind(&always.checks, Some(&always.selection));
+                if let Extent::Until(until) = &always.extent {
+                    bind(&until.checks, Some(&until.selection));
+                }
+                &[]
+            }
+            Verb::Action(action) => {
+                bind(&action.checks, None);
+                &[]
+            }
+            Verb::Retained(retained) => {
+                bind(&retained.checks, Some(&retained.selection));
+                &retained.assert[..]
+            }
+            Verb::Send(_) | Verb::Link(_) | Verb::Serve(_) | Verb::Operator(_) | Verb::Vehicle(_) => &[],
+        };
+        let asserted = asserted.iter().filter(|one| !named(&one.selection));
+        bound.extend(asserted.map(|one| (&one.requirement, &one.span)));
+        for (id, at) in bound {
+            self.not_permitted(id, at, packs);
         }
     }
 

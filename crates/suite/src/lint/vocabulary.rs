@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use serde_json::Value;
 
-use tck_pack::{Breakage, BreakageScope, Catalogue, Hooks, Pack, Packs, Role, Shape, Version};
+use tck_pack::{Breakage, BreakageScope, Catalogue, Hooks, Mood, Pack, Packs, Role, Shape, Version};
 use tck_view::{Field, Object, Topic};
 
 /// What the catalogue says about one requirement.
@@ -16,6 +16,8 @@ pub struct RequirementFacts {
     pub roles: Vec<Role>,
     /// The packs that have it, as indices into [`Vocabulary::versions`].
     pub packs: Vec<usize>,
+    /// Those of them in which it is a permission, which nothing breaks.
+    pub permitting: Vec<usize>,
 }
 
 /// The names a suite may use. A pack is meant by its index into [`Vocabulary::versions`].
@@ -153,16 +155,15 @@ impl Vocabulary for PackVocabulary<'_> {
 
     fn requirement(&self, id: &str) -> Option<RequirementFacts> {
         let requirement = self.catalogue.get(id)?;
-        let has = |pack: &usize| {
-            let pack = self.packs.all().get(*pack);
-            pack.is_some_and(|pack| requirement.in_version(pack).is_some())
-        };
+        let mood = |pack: usize| Some(requirement.in_version(self.packs.all().get(pack)?)?.mood);
+        let all = 0..self.packs.all().len();
         Some(RequirementFacts {
             roles: [Role::Agv, Role::MasterControl]
                 .into_iter()
                 .filter(|role| requirement.role.concerns(*role))
                 .collect(),
-            packs: (0..self.packs.all().len()).filter(has).collect(),
+            packs: all.clone().filter(|pack| mood(*pack).is_some()).collect(),
+            permitting: all.filter(|pack| mood(*pack) == Some(Mood::May)).collect(),
         })
     }
 
