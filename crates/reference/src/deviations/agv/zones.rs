@@ -156,7 +156,7 @@ records! {
             }
             true
         });
-    fault "zone-actions-not-listed" ["ZACT-STATE-01", "ZACT-STATE-02", "STATE-09"] "Has no list of the actions of zones."
+    fault "zone-actions-not-listed" ["ZACT-STATE-01", "ZACT-STATE-02"] "Has no list of the actions of zones."
         => state(|_, words| {
             words.remove("zoneActionStates");
         });
