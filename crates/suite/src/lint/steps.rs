@@ -3,11 +3,13 @@
 use super::paths::Topic;
 use super::scope::Scope;
 use super::{Linter, within};
-use crate::model::{Binding, Extent, Patch, Path, Section, Selection, Send, Step, VehicleStep, Verb, Walk, Which};
+use crate::model::{
+    Assertion, Binding, Extent, Patch, Path, Section, Selection, Send, Step, VehicleStep, Verb, Walk, Which,
+};
 use tck_base::diagnostic::{Diagnostic, Span};
 use tck_base::pattern::{Term, TermKind};
 use tck_journal::event::LinkFault;
-use tck_pack::{RequirementId, Role};
+use tck_pack::Role;
 use tck_profile::{VEHICLE_WORDS, find_vehicle_word};
 
 /// Where the first requirement of a clause is written.
@@ -104,42 +106,32 @@ impl Linter<'_> {
     /// what it remarks on.
     fn can_be_broken(&mut self, step: &Step, packs: &[usize]) {
         let named = |selection: &Selection| selection.check.is_some();
-        let mut bound: Vec<(&RequirementId, &Span)> = Vec::new();
-        let mut bind = |bindings: &[Binding], selection: Option<&Selection>| {
-            if !step.prefers && !selection.is_some_and(named) {
-                bound.extend(bindings.iter().map(|one| (&one.requirement, &one.span)));
-            }
-        };
-        let asserted = match &*step.verb {
+        let mut bound: Vec<&Binding> = Vec::new();
+        let mut asserted: &[Assertion] = &[];
+        match &*step.verb {
             Verb::Expect(expect) => {
-                bind(&expect.checks, Some(&expect.selection));
-                &expect.assert[..]
+                asserted = &expect.assert;
+                bound.extend(expect.checks.iter().filter(|_| !named(&expect.selection)));
             }
-            Verb::Never(never) => {
-                bind(&never.checks, Some(&never.selection));
-                &[]
-            }
+            Verb::Never(never) => bound.extend(never.checks.iter().filter(|_| !named(&never.selection))),
             Verb::Always(always) => {
-                bind(&always.checks, Some(&always.selection));
+                bound.extend(always.checks.iter().filter(|_| !named(&always.selection)));
                 if let Extent::Until(until) = &always.extent {
-                    bind(&until.checks, Some(&until.selection));
+                    bound.extend(until.checks.iter().filter(|_| !named(&until.selection)));
                 }
-                &[]
             }
-            Verb::Action(action) => {
-                bind(&action.checks, None);
-                &[]
-            }
+            Verb::Action(action) => bound.extend(&action.checks),
             Verb::Retained(retained) => {
-                bind(&retained.checks, Some(&retained.selection));
-                &retained.assert[..]
+                asserted = &retained.assert;
+                bound.extend(retained.checks.iter().filter(|_| !named(&retained.selection)));
             }
-            Verb::Send(_) | Verb::Link(_) | Verb::Serve(_) | Verb::Operator(_) | Verb::Vehicle(_) => &[],
-        };
-        let asserted = asserted.iter().filter(|one| !named(&one.selection));
-        bound.extend(asserted.map(|one| (&one.requirement, &one.span)));
-        for (id, at) in bound {
-            self.not_permitted(id, at, packs);
+            Verb::Send(_) | Verb::Link(_) | Verb::Serve(_) | Verb::Operator(_) | Verb::Vehicle(_) => {}
+        }
+        for Binding { requirement, span } in bound.into_iter().filter(|_| !step.prefers) {
+            self.not_permitted(requirement, span, packs);
+        }
+        for assertion in asserted.iter().filter(|one| !named(&one.selection)) {
+            self.not_permitted(&assertion.requirement, &assertion.span, packs);
         }
     }
 
