@@ -34,7 +34,8 @@ fn run_all(library: &Library, pack: &Pack, requests: &[VirtualRun]) -> Vec<RunRe
 
 fn with(library: &Library, pack: &Pack, tolerances: &[&str]) -> VirtualRun {
     let mut request = VirtualRun::of_role(Role::MasterControl, library, pack);
-    for name in tolerances {
+    let exceptions = library.rules.suites.exceptions.of(Role::MasterControl, pack.version);
+    for name in tolerances.iter().filter(|name| !exceptions.is_forbidden(name)) {
         request.device.tolerate(name).unwrap();
     }
     request

@@ -16,9 +16,10 @@ records! {
     fault "blocking-type-unlisted" ["FACT-15"] "Does not look for blocking types in the factsheet."
         => making(|_, _, a, _, _| a.set("blockingType", "HARD"));
     tolerance "soft-actions" ["FACT-15"] "Uses the blocking type SOFT where the vehicle allows it."
-        => making(|_, vehicle, a, _, _| {
+        => making(|_, vehicle, a, _, instant| {
             let listed = vehicle.offer(a.text("actionType")).and_then(|offer| offer.blocking_types.as_deref()).unwrap_or_default();
-            if listed.is_empty() || listed.iter().any(|kind| kind == "SOFT") { a.set("blockingType", "SOFT"); }
+            let free = !(instant && vehicle.config.has("instantActionsNeverBlock"));
+            if free && (listed.is_empty() || listed.iter().any(|kind| kind == "SOFT")) { a.set("blockingType", "SOFT"); }
         });
     tolerance "instants-block-nothing" ["ORD-MSG-16", "FACT-15"] "Instant actions have blockingType NONE where the vehicle allows it."
         => making(|_, vehicle, a, _, instant| {
