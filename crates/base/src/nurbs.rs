@@ -14,7 +14,7 @@ const FARTHEST: f64 = 1e9;
 /// How far a knot may leave 0 … 1 by rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// What is wrong with a trajectory (ORD-MSG-28, ORD-MSG-29).
+/// What is wrong with a trajectory (ORD-MSG-28, ORD-MSG-29, ORD-MSG-31).
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Flaw {
     /// A member is missing or of a wrong type.
@@ -26,6 +26,14 @@ pub enum Flaw {
     /// There is no knotVector; even knots are assumed, as many of the first and of the last as the degree and one.
     #[error("knotVector is missing")]
     KnotsMissing,
+    /// There are fewer control points than a curve of this degree has.
+    #[error("{points} control points are too few for degree {degree}, which needs {}", degree + 1)]
+    PointCount {
+        /// Number of control points.
+        points: usize,
+        /// degree.
+        degree: usize,
+    },
     /// knotVector has a wrong length.
     #[error("knotVector has {found} values; {points} control points of degree {degree} need {wanted}")]
     KnotCount {
@@ -186,6 +194,15 @@ impl Curve {
         }
         if !flaws.iter().all(Flaw::has_default) {
             return (None, flaws);
+        }
+        if points.len() <= degree {
+            flaws.push(Flaw::PointCount {
+                points: points.len(),
+                degree,
+            });
+            if knots.is_none() {
+                return (None, flaws);
+            }
         }
         let knots = knots.unwrap_or_else(|| even_knots(degree, points.len()));
         let wanted = points.len() + degree + 1;

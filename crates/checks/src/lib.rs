@@ -181,6 +181,7 @@ pub static REGISTRY: &[Check] = &[
     zones::RELEASE_GRANTED,
     zones::RELEASE_KEPT,
     zones::ACTIONS_LISTED,
+    zones::REQUESTS_LISTED,
     motion_signs::TURN_SIGN,
     motion::MODE_SPEED,
     commands::NODES_AND_EDGES,

@@ -12,10 +12,10 @@ use tck_world::{Listen, Observation, Topic};
 /// `state/trajectory`.
 pub(super) const TRAJECTORY: Check = Check {
     name: "state/trajectory",
-    decides: &["ORD-MSG-28", "ORD-MSG-29"],
+    decides: &["ORD-MSG-28", "ORD-MSG-29", "ORD-MSG-31"],
     doc: "Every trajectory in edgeStates has a whole degree of at least 1, control points with x and y and with weights \
-          not below 0, and as many knots within 0 to 1 as control points, degree and one together. A missing degree \
-          and knots out of order are warnings.",
+          not below 0, more of them than the degree, and as many knots within 0 to 1 as control points, degree and one \
+          together. A missing degree and knots out of order are warnings.",
     arguments: &[],
     listens: &[Listen::Delivered(Topic::State)],
     reads: &[],
@@ -103,6 +103,7 @@ impl Running for Shape {
                 findings.push(match flaw {
                     Flaw::Member(_) | Flaw::KnotsMissing => broken("ORD-MSG-28", record.seq(), message),
                     Flaw::DegreeMissing => remark("ORD-MSG-28", record.seq(), message),
+                    Flaw::PointCount { .. } => broken("ORD-MSG-31", record.seq(), message),
                     Flaw::KnotCount { .. } | Flaw::KnotRange { .. } => broken("ORD-MSG-29", record.seq(), message),
                     Flaw::KnotOrder(_) => remark("ORD-MSG-29", record.seq(), message),
                 });

@@ -12,10 +12,10 @@ use tck_world::{Listen, Topic};
 /// `commands/trajectory`.
 pub(crate) const TRAJECTORY: Check = Check {
     name: "commands/trajectory",
-    decides: &["ORD-MSG-28", "ORD-MSG-29"],
+    decides: &["ORD-MSG-28", "ORD-MSG-29", "ORD-MSG-31"],
     doc: "Every trajectory of an order has a whole degree of at least 1, control points with x and y and with weights \
-          not below 0, and as many knots within 0 to 1 as control points, degree and one together. A missing degree \
-          and knots out of order are warnings.",
+          not below 0, more of them than the degree, and as many knots within 0 to 1 as control points, degree and one \
+          together. A missing degree and knots out of order are warnings.",
     arguments: &[],
     listens: &[Listen::Delivered(Topic::Order)],
     reads: &[],
@@ -52,6 +52,7 @@ fn shape(command: Command<'_>, context: &CheckContext<'_>, found: &mut Found<'_>
             match flaw {
                 Flaw::Member(_) | Flaw::KnotsMissing => found.broken("ORD-MSG-28", text),
                 Flaw::DegreeMissing => found.remark("ORD-MSG-28", text),
+                Flaw::PointCount { .. } => found.broken("ORD-MSG-31", text),
                 Flaw::KnotCount { .. } | Flaw::KnotRange { .. } => found.broken("ORD-MSG-29", text),
                 Flaw::KnotOrder(_) => found.remark("ORD-MSG-29", text),
             }

@@ -1,4 +1,4 @@
-//! `zones/actions-listed`: a vehicle that heeds ACTION zones has a list of their actions in every state.
+//! `zones/actions-listed` and `zones/requests-listed`: what a vehicle that heeds zones has a list of in every state.
 
 use crate::finding::broken;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
@@ -15,17 +15,52 @@ pub(crate) const ACTIONS_LISTED: Check = Check {
     listens: &[Listen::Delivered(Topic::Factsheet), Listen::Delivered(Topic::State)],
     reads: &[Fact::Factsheets],
     needs: &[StateView::zone_action_states, TypeSpecification::supported_zones],
-    start: |_| Box::new(ActionsListed),
+    start: |_| {
+        Box::new(Listed {
+            requirement: "ZACT-STATE-01",
+            zones: &["ACTION"],
+            is_there: |state| state.zone_action_states.is_there(),
+            text: "zoneActionStates is missing, and the vehicle heeds ACTION zones",
+        })
+    },
 };
 
-struct ActionsListed;
+/// `zones/requests-listed`.
+pub(crate) const REQUESTS_LISTED: Check = Check {
+    name: "zones/requests-listed",
+    decides: &["STATE-MSG-22"],
+    doc: "zoneRequests stands in every state of a vehicle whose supportedZones lists RELEASE or COORDINATED_REPLANNING, empty where \
+          it asks for nothing. Nothing is judged before there is a factsheet.",
+    arguments: &[],
+    listens: &[Listen::Delivered(Topic::Factsheet), Listen::Delivered(Topic::State)],
+    reads: &[Fact::Factsheets],
+    needs: &[StateView::zone_requests, TypeSpecification::supported_zones],
+    start: |_| {
+        Box::new(Listed {
+            requirement: "STATE-MSG-22",
+            zones: &["RELEASE", "COORDINATED_REPLANNING"],
+            is_there: |state| state.zone_requests.is_there(),
+            text: "zoneRequests is missing, and the vehicle asks for zones",
+        })
+    },
+};
 
-fn heeds_actions(sheet: &Factsheet) -> bool {
-    let kinds = sheet.view.type_specification.there().map(|kind| &kind.supported_zones);
-    kinds.is_some_and(|kinds| kinds.texts().any(|kind| kind == "ACTION"))
+struct Listed {
+    requirement: &'static str,
+    /// The types of zones of which one has to be listed in supportedZones.
+    zones: &'static [&'static str],
+    is_there: fn(&StateView) -> bool,
+    text: &'static str,
 }
 
-impl Running for ActionsListed {
+impl Listed {
+    fn is_owed(&self, sheet: &Factsheet) -> bool {
+        let kinds = sheet.view.type_specification.there().map(|kind| &kind.supported_zones);
+        kinds.is_some_and(|kinds| kinds.texts().any(|kind| self.zones.contains(&kind)))
+    }
+}
+
+impl Running for Listed {
     fn observe(
         &mut self,
         record: &Observation<'_>,
@@ -34,12 +69,11 @@ impl Running for ActionsListed {
     ) -> bool {
         let Some(state) = record.state() else { return false };
         let sheets = context.world.factsheets().valid(record, context);
-        if sheets.is_empty() || !sheets.iter().all(|sheet| heeds_actions(sheet)) {
+        if sheets.is_empty() || !sheets.iter().all(|sheet| self.is_owed(sheet)) {
             return false;
         }
-        if !state.zone_action_states.is_there() {
-            let text = "zoneActionStates is missing, and the vehicle heeds ACTION zones";
-            findings.push(broken("ZACT-STATE-01", record.seq(), text));
+        if !(self.is_there)(state) {
+            findings.push(broken(self.requirement, record.seq(), self.text));
         }
         true
     }

@@ -18,7 +18,7 @@ pub(super) use actions::ZONE_ACTIONS;
 pub(super) use blocked::BLOCKED;
 pub(super) use directed::DIRECTED;
 pub(super) use line_guided::LINE_GUIDED;
-pub(super) use listed::ACTIONS_LISTED;
+pub(super) use listed::{ACTIONS_LISTED, REQUESTS_LISTED};
 pub(super) use release::{RELEASE_ASKED, RELEASE_GRANTED, RELEASE_KEPT};
 pub(super) use requests::ZONE_REQUESTS;
 pub(super) use sets::ZONE_SETS;

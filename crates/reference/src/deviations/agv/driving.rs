@@ -214,6 +214,16 @@ records! {
             *points = vec![part(-0.7), part(0.5), part(1.7)];
             knots.insert(2, 0.5);
         });
+    fault "trajectories-of-degree-three" ["ORD-MSG-31"] "It reports trajectories with degree 3, whatever number of control points they have."
+        => edge(|_, _, m| {
+            m.part("trajectory", |path| {
+                let points = path.list("controlPoints").len();
+                let knots: Vec<f64> = (0..points + 4).map(|knot| if knot < 4 { 0.0 } else { 1.0 }).collect();
+                path.set("degree", 3);
+                path.set("knotVector", knots);
+            });
+            true
+        });
     fault "knots-too-few" ["ORD-MSG-29"] "Leaves the last knot out of the trajectory it reports."
         => path(|_, _, _, knots| {
             knots.pop();

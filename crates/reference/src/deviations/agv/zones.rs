@@ -160,6 +160,10 @@ records! {
         => state(|_, words| {
             words.remove("zoneActionStates");
         });
+    fault "empty-zone-requests-left-out" ["STATE-MSG-22"] "It leaves zoneRequests out where it asks for no zone."
+        => state(|_, words| if words.list("zoneRequests").is_empty() {
+            words.remove("zoneRequests");
+        });
     fault "zone-actions-forgotten-with-the-order" ["ZACT-STATE-04"] "Forgets the actions of zones that have ended when it takes over a new order."
         => when(Event::Begun, |agv| agv.actions.retain(|action| !action.of_zone() || !action.status.is_terminal()));
     fault "zone-actions-forgotten-when-done" ["ZACT-STATE-04", "ZACT-STATE-02"] "Does not list an action of a zone any more once it has ended."

@@ -11,6 +11,13 @@ records! {
         => curve(|c| c.set("knotVector", json!([0.0, 0.0, 2.0, 2.0])));
     fault "cubic-of-two-points" ["ORD-MSG-29"] "Trajectories have degree 3 with two control points and four knots."
         => curve(|c| c.set("degree", 3));
+    fault "cubic-of-three-points" ["ORD-MSG-31"] "Trajectories have degree 3 with three control points and seven knots."
+        => curve(|c| {
+            let (from, to) = (c["controlPoints"][0].clone(), c["controlPoints"][1].clone());
+            c.set("degree", 3);
+            c.set("knotVector", json!([0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]));
+            c.set("controlPoints", json!([from, between(&from, &to, 0.5), to]));
+        });
     fault "degree-is-order" ["ORD-MSG-29"]
         "It sends the order of a curve, one more than its degree, as the degree of a trajectory, so that the knot vector is too short for it."
         => curve(|c| c.set("degree", c["degree"].as_u64().unwrap_or_default() + 1));
