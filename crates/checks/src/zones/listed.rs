@@ -2,8 +2,8 @@
 
 use crate::finding::broken;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_view::{StateView, TypeSpecification};
-use tck_world::{Fact, Factsheet, Listen, Observation, Topic};
+use tck_view::{FactsheetView, MessageView, StateView, TypeSpecification};
+use tck_world::{Listen, Observation, Seen, Topic};
 
 /// `zones/actions-listed`.
 pub(crate) const ACTIONS_LISTED: Check = Check {
@@ -12,8 +12,12 @@ pub(crate) const ACTIONS_LISTED: Check = Check {
     doc: "zoneActionStates stands in every state of a vehicle whose supportedZones lists ACTION. Nothing is judged before there \
           is a factsheet.",
     arguments: &[],
-    listens: &[Listen::Delivered(Topic::Factsheet), Listen::Delivered(Topic::State)],
-    reads: &[Fact::Factsheets],
+    listens: &[
+        Listen::Delivered(Topic::Factsheet),
+        Listen::Stored(Topic::Factsheet),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[],
     needs: &[StateView::zone_action_states, TypeSpecification::supported_zones],
     start: |_| {
         Box::new(Listed {
@@ -21,6 +25,7 @@ pub(crate) const ACTIONS_LISTED: Check = Check {
             zones: &["ACTION"],
             is_there: |state| state.zone_action_states.is_there(),
             text: "zoneActionStates is missing, and the vehicle heeds ACTION zones",
+            is_owed: false,
         })
     },
 };
@@ -32,8 +37,12 @@ pub(crate) const REQUESTS_LISTED: Check = Check {
     doc: "zoneRequests stands in every state of a vehicle whose supportedZones lists RELEASE or COORDINATED_REPLANNING, empty where \
           it asks for nothing. Nothing is judged before there is a factsheet.",
     arguments: &[],
-    listens: &[Listen::Delivered(Topic::Factsheet), Listen::Delivered(Topic::State)],
-    reads: &[Fact::Factsheets],
+    listens: &[
+        Listen::Delivered(Topic::Factsheet),
+        Listen::Stored(Topic::Factsheet),
+        Listen::Delivered(Topic::State),
+    ],
+    reads: &[],
     needs: &[StateView::zone_requests, TypeSpecification::supported_zones],
     start: |_| {
         Box::new(Listed {
@@ -41,6 +50,7 @@ pub(crate) const REQUESTS_LISTED: Check = Check {
             zones: &["RELEASE", "COORDINATED_REPLANNING"],
             is_there: |state| state.zone_requests.is_there(),
             text: "zoneRequests is missing, and the vehicle asks for zones",
+            is_owed: false,
         })
     },
 };
@@ -51,27 +61,29 @@ struct Listed {
     zones: &'static [&'static str],
     is_there: fn(&StateView) -> bool,
     text: &'static str,
+    /// Whether the last factsheet lists one of them.
+    is_owed: bool,
 }
 
 impl Listed {
-    fn is_owed(&self, sheet: &Factsheet) -> bool {
-        let kinds = sheet.view.type_specification.there().map(|kind| &kind.supported_zones);
+    fn lists_one(&self, sheet: &FactsheetView) -> bool {
+        let kinds = sheet.type_specification.there().map(|kind| &kind.supported_zones);
         kinds.is_some_and(|kinds| kinds.texts().any(|kind| self.zones.contains(&kind)))
     }
 }
 
 impl Running for Listed {
-    fn observe(
-        &mut self,
-        record: &Observation<'_>,
-        context: &CheckContext<'_>,
-        findings: &mut Vec<CheckFinding>,
-    ) -> bool {
-        let Some(state) = record.state() else { return false };
-        let sheets = context.world.factsheets().valid(record, context);
-        if sheets.is_empty() || !sheets.iter().all(|sheet| self.is_owed(sheet)) {
+    fn observe(&mut self, record: &Observation<'_>, _: &CheckContext<'_>, findings: &mut Vec<CheckFinding>) -> bool {
+        let says = |seen| record.is(seen, Topic::Factsheet);
+        if says(Seen::Delivered) || says(Seen::Stored) {
+            if let Some(sheet) = record.message().and_then(MessageView::factsheet) {
+                self.is_owed = self.lists_one(sheet);
+            }
             return false;
         }
+        let Some(state) = record.state().filter(|_| self.is_owed) else {
+            return false;
+        };
         if !(self.is_there)(state) {
             findings.push(broken(self.requirement, record.seq(), self.text));
         }

@@ -94,7 +94,7 @@ records! {
         }));
     fault "parameter-type-unknown" ["BP-05", "FACT-07", "JSON-02"] "Calls the type of its parameters DOUBLE."
         => factsheet(|_, m| actions(m, |a| a.each("actionParameters", |p| p.set("valueDataType", "DOUBLE"))));
-    fault "factsheet-parameter-type-float" ["FACT-07"] "It gives the numeric parameters in the factsheet the valueDataType FLOAT64."
+    fault "factsheet-parameter-type-float" ["FACT-07", "JSON-02"] "It gives the numeric parameters in the factsheet the valueDataType FLOAT64."
         => factsheet(|_, m| actions(m, |a| a.each("actionParameters", |p| if matches!(p.text("valueDataType"), "FLOAT" | "NUMBER") {
             p.set("valueDataType", "FLOAT64");
         })));

@@ -271,7 +271,7 @@ records! {
         });
     fault "unknown-instant-silent" ["IACT-06"] "Fails an instant action it cannot perform, and raises no error." because "It breaks a recommendation only."
         => failure(|agv, action, e| !is_refused_instant(agv, action, &e.error_type));
-    fault "unknown-instant-unreferenced" ["BP-01"] "Raises an error without references for an instant action it cannot perform." because "It breaks a recommendation only."
+    fault "unknown-instant-unreferenced" ["BP-01", "ERR-10"] "Raises an error without references for an instant action it cannot perform." because "It breaks a recommendation only."
         => failure(|agv, action, e| {
             if is_refused_instant(agv, action, &e.error_type) {
                 e.references.clear();

@@ -76,7 +76,7 @@ records! {
         });
     fault "order-error-unreferenced" ["ORD-REJ-07", "BP-01"] "Does not say what it cannot perform."
         => refusal(|_, rule, _, e| said(rule == Rule::Unable, || e.references.clear()));
-    fault "busy-refusal-unreferenced" ["BP-01"] "The error for a new order while another one is active has no errorReferences at all."
+    fault "busy-refusal-unreferenced" ["BP-01", "ERR-10"] "The error for a new order while another one is active has no errorReferences at all."
         because "BP-01, that an error names what it is about, is a recommendation; the refusal itself is right."
         => refusal(|_, rule, _, e| said(rule == Rule::OtherOrderActive, || e.references.clear()));
     fault "new-rejection-replaces-old-warning" ["ORD-REJ-08", "ORD-REJ-03", "ERR-01"] "It holds one order error only, so that the next rejection replaces an orderError or validationError that must stay."
