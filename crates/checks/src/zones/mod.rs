@@ -8,9 +8,9 @@ mod listed;
 mod release;
 #[cfg(test)]
 mod release_tests;
+mod replanning;
 #[cfg(test)]
 mod replanning_tests;
-mod replanning;
 mod requests;
 mod sets;
 mod speed;
