@@ -95,6 +95,30 @@ fn what_fails_has_a_beginning_and_what_is_mended_an_end() {
         .prints("between: profile built-in.fault: outdated-update-taken-over -> nothing; command: run --virtual");
 }
 
+/// Two devices of one name that are tested at once, as a campaign does, may begin in the same millisecond and with the same
+/// seed; the same run that was rendered anew is known by its first record.
+#[test]
+fn runs_that_begin_together_are_told_apart_and_one_rendered_anew_is_not_counted() {
+    let bench = Bench::new();
+    run(&bench, None);
+    let archive = bench.path().join("archive");
+    let first = bundles(&bench).remove(0);
+    for (name, seed) in [("beside", "--seed=1"), ("anew", "--seed\",\"1")] {
+        let copied = archive.join("copies").join(name);
+        copy(&first, &copied);
+        let journal = copied.join("journal.jsonl");
+        let text = fs::read_to_string(&journal).unwrap();
+        fs::write(&journal, text.replacen("--seed\",\"1", seed, 1)).unwrap();
+        fs::write(copied.join("notes.txt"), name).unwrap();
+        Manifest::write(&copied).unwrap();
+    }
+    let found = history(&bench, "archive");
+    assert_eq!(found["bundles"], 2, "{found:#}");
+    let left: Vec<&Value> = found["leftOut"].as_array().unwrap().iter().collect();
+    assert_eq!(left.len(), 1, "{left:?}");
+    assert_eq!(left[0]["why"], "twice");
+}
+
 #[test]
 fn nothing_is_mixed_that_does_not_belong_together_and_what_is_no_evidence_is_named() {
     let bench = Bench::new();

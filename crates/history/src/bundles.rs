@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::header;
-use crate::seen::SeenRun;
+use crate::seen::{SeenRun, Subject};
 use tck_audit::saved;
 use tck_journal::file;
 use tck_report::clean::{line, short};
@@ -128,8 +128,8 @@ struct Reading {
     found: Found,
     /// Bundles by their root hash.
     roots: BTreeMap<String, String>,
-    /// Runs that a later one has gone on with: identifier and start, and the path of the later one.
-    joined: BTreeMap<(String, String), String>,
+    /// Runs that a later one has gone on with: subject, identifier and start, and the path of the later one.
+    joined: BTreeMap<(Subject, String, String), String>,
 }
 
 impl Reading {
@@ -196,27 +196,30 @@ impl Reading {
         if let Some(doubt) = &result.mixed {
             return self.leave_out(path, Why::Doubtful, doubt);
         }
-        for before in &result.joined {
-            self.joined
-                .insert((before.run.clone(), before.started.clone()), path.clone());
-        }
         // Without its first record it is not known what was started how, and nothing else is lost.
         let header = header::read(&file::find(bundle)).ok().flatten();
         self.found.bundles += 1;
-        self.found
-            .runs
-            .push(SeenRun::of_run(&result, header.as_deref(), path, root));
+        let run = SeenRun::of_run(&result, header.as_deref(), path.clone(), root);
+        for before in &result.joined {
+            self.joined.insert(
+                (run.subject.clone(), before.run.clone(), before.started.clone()),
+                path.clone(),
+            );
+        }
+        self.found.runs.push(run);
     }
 
     fn end(mut self) -> Found {
-        let mut same: BTreeMap<(String, String), String> = BTreeMap::new();
+        // Two runs may begin in the same millisecond, with the same seed and of devices with the same name: a
+        // campaign begins several at once. Their command lines tell them apart.
+        let mut same: BTreeMap<_, String> = BTreeMap::new();
         let runs = std::mem::take(&mut self.found.runs);
         for run in runs {
-            let key = run.run.clone().map(|id| (id, run.started.clone()));
+            let key = (run.run.clone()).map(|id| ((run.subject.clone(), id, run.started.clone()), run.command.clone()));
             let reason = key.as_ref().and_then(|key| {
                 let later = self
                     .joined
-                    .get(key)
+                    .get(&key.0)
                     .filter(|later| **later != run.path && run.partial.is_some());
                 let later = later.map(|later| (Why::GoneOnWith, format!("the run in {later} has gone on with it")));
                 let twice = || {

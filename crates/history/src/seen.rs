@@ -62,6 +62,8 @@ pub(crate) struct SeenRun {
     /// Identifier of the run; nothing for an audit.
     pub run: Option<String>,
     pub started: String,
+    /// The command line as typed; empty for an audit, and where it is not known.
+    pub command: Vec<String>,
     pub verdict: Option<Verdict>,
     /// Why it is partial.
     pub partial: Option<String>,
@@ -132,6 +134,7 @@ impl SeenRun {
             path,
             run: Some(result.run.clone()),
             started: result.started.clone(),
+            command: header.map(|header| header.command.clone()).unwrap_or_default(),
             verdict: result.verdict,
             partial: result
                 .partial
@@ -198,6 +201,7 @@ impl SeenRun {
             path: path.to_owned(),
             run: None,
             started: result.first.clone().unwrap_or_default(),
+            command: Vec::new(),
             verdict: side.verdict,
             partial: None,
             selection: false,

@@ -33,6 +33,7 @@ fn run(firmware: &str, by: &[(&str, Verdict)]) -> SeenRun {
         path: String::new(),
         run: None,
         started: String::new(),
+        command: Vec::new(),
         verdict: worst,
         partial: None,
         selection: false,
