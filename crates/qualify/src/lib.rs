@@ -29,7 +29,7 @@ use self::decider::{blemishes_of, decided_in};
 use self::kill::{KillContext, Vehicle, each};
 use tck_engine::EngineError;
 use tck_judge::Library;
-use tck_pack::{Pack, Role};
+use tck_pack::{Mood, Pack, Role};
 use tck_reference::Fault;
 use tck_run::{Selection, VirtualRun, run_silently};
 use tck_simulate::BuiltIn;
@@ -104,6 +104,36 @@ fn possible(library: &Library, pack: &Pack, faults: &[Fault], depth: Depth) -> V
     faults.iter().filter(possible).copied().collect()
 }
 
+/// What the monitors on duty decide. One that judges nothing on the faultless device passes nothing there, and has to be
+/// failed by a fault all the same.
+fn on_duty(library: &Library, pack: &Pack, role: Role) -> impl Iterator<Item = Decider> {
+    let rules = &library.rules;
+    let is_judged = move |id: &str| {
+        let requirement = rules.catalogue.get(id).filter(|one| one.role.concerns(role));
+        let note = requirement.and_then(|requirement| requirement.in_version(pack));
+        note.is_some_and(|note| note.mood != Mood::May)
+    };
+    let all = rules.suites.monitors.iter();
+    all.filter(move |one| one.device.is_none_or(|device| device == role) && one.spec.contains(pack.version))
+        .flat_map(|monitor| monitor.checks.iter().map(move |check| (monitor, check)))
+        .filter(move |(_, check)| is_judged(check.requirement.as_str()))
+        .map(|(monitor, check)| Decider {
+            requirement: check.requirement.to_string(),
+            place: monitor.id.clone(),
+        })
+}
+
+/// The requirements of the earlier versions in which each fault has to be found.
+fn earlier(library: &Library, pack: &Pack, role: Role) -> BTreeSet<String> {
+    let rules = &library.rules;
+    let proven = rules.packs.of_role(role).filter(|other| other.finds_every_fault());
+    let before: Vec<_> = proven.filter(|other| other.version < pack.version).collect();
+    let all = rules.catalogue.all();
+    all.filter(|one| before.iter().any(|other| one.in_version(other).is_some()))
+        .map(|one| one.id.to_string())
+        .collect()
+}
+
 /// What faults are tried on, and what the faultless device shows of it.
 fn prepared<'l>(
     library: &'l Library,
@@ -135,6 +165,7 @@ fn prepared<'l>(
         });
         deciders.extend(own);
     }
+    deciders.extend(on_duty(library, pack, role));
     let grounds = KillContext {
         library,
         pack,
@@ -143,6 +174,7 @@ fn prepared<'l>(
     let outcome = Qualification {
         role,
         owes_faults: pack.finds_every_fault(),
+        earlier: earlier(library, pack, role),
         blemishes,
         deciders,
         kills: Vec::new(),

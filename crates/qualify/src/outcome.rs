@@ -17,6 +17,9 @@ pub struct Qualification {
     pub role: Role,
     /// Whether each fault has to be found in this version.
     pub owes_faults: bool,
+    /// The requirements that an earlier version has in which each fault has to be found. What is a lapse there may be a
+    /// fault in this one, which demands more.
+    pub earlier: BTreeSet<String>,
     /// What is not a pass on the faultless device: decider and verdict.
     pub blemishes: Vec<(Decider, Verdict)>,
     /// Everything that passes on the faultless device.
@@ -80,7 +83,8 @@ impl Qualification {
             all.push(format!("fault {} is found, and needs no reason", kill.fault.name));
         }
         for kill in &self.kills {
-            let is_lapse = BuiltIn::lapse(self.role, kill.fault.name).is_some();
+            let is_earlier = kill.fault.breaks.iter().any(|id| self.earlier.contains(*id));
+            let is_lapse = !is_earlier && BuiltIn::lapse(self.role, kill.fault.name).is_some();
             if self.owes_faults && is_lapse && kill.named() == Some(Verdict::Fail) {
                 all.push(format!("lapse {} fails, so that it is a fault", kill.fault.name));
             }

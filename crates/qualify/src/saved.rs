@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::{Deserialize, Serialize};
 
 use super::decider::Decider;
+use super::earlier;
 use super::find::is_found;
 use super::kill::Kill;
 use super::outcome::Qualification;
@@ -154,6 +155,7 @@ impl QualifiedSide {
         Qualification {
             role,
             owes_faults: pack.finds_every_fault(),
+            earlier: earlier(library, pack, role),
             blemishes: self
                 .blemishes
                 .iter()

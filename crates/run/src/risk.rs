@@ -21,13 +21,13 @@ enum Risk {
     Connection,
     /// Something is done to it by hand.
     ByHand,
-    /// Its maps or its place on them change.
+    /// Its maps, its zones or its place on them change.
     Maps,
     /// Its mode, its pause or its safety is changed.
     Modes,
     /// A fault is brought about.
     Faults,
-    /// It is switched off.
+    /// It is switched off, sent to sleep, or may not find back to the broker.
     Power,
 }
 
@@ -97,6 +97,7 @@ fn risk(test: &Test, hooks: &Hooks) -> Risk {
                 hook.map_or(Risk::ByHand, |hook| hook.risk.into())
             }
             Verb::Serve(_) => Risk::Maps,
+            Verb::Send(send) if send.topic == "zoneSet" => Risk::Maps,
             Verb::Send(_) => of_text(step.span.text()),
             _ => Risk::Nothing,
         };
@@ -117,15 +118,24 @@ impl From<HookRisk> for Risk {
     }
 }
 
+/// What a message may do by the actions in it.
 fn of_text(text: &str) -> Risk {
-    let maps = ["initPosition", "enableMap", "downloadMap", "deleteMap"];
-    if maps.iter().any(|word| text.contains(word)) {
-        Risk::Maps
-    } else if text.contains("startPause") {
-        Risk::Modes
-    } else {
-        Risk::Nothing
-    }
+    const BY_ACTION: [(&str, Risk); 12] = [
+        ("shutdown", Risk::Power),
+        ("startHibernation", Risk::Power),
+        ("updateCertificate", Risk::Power),
+        ("startPause", Risk::Modes),
+        ("initPosition", Risk::Maps),
+        ("initializePosition", Risk::Maps),
+        ("downloadMap", Risk::Maps),
+        ("enableMap", Risk::Maps),
+        ("deleteMap", Risk::Maps),
+        ("downloadZoneSet", Risk::Maps),
+        ("enableZoneSet", Risk::Maps),
+        ("deleteZoneSet", Risk::Maps),
+    ];
+    let mut all = BY_ACTION.iter().filter(|(action, _)| text.contains(action));
+    all.next().map_or(Risk::Nothing, |(_, risk)| *risk)
 }
 
 #[cfg(test)]

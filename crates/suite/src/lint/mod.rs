@@ -8,6 +8,7 @@ mod checks;
 mod harness_topics;
 mod names;
 mod paths;
+mod requirements;
 mod scope;
 mod steps;
 mod vocabulary;
@@ -392,75 +393,6 @@ impl<'a> Linter<'a> {
         }
     }
 
-    /// Checks the requirements of a clause; the packs that have one of them, or `None` without any.
-    fn requirements(&mut self, bindings: &[Binding], packs: &[usize]) -> Option<Vec<usize>> {
-        let mut having = BTreeSet::new();
-        for binding in bindings {
-            having.extend(self.requirement(&binding.requirement, &binding.span, packs));
-        }
-        (!bindings.is_empty()).then(|| having.into_iter().collect())
-    }
-
-    /// The packs out of `packs` that have the requirement.
-    /// Refuses a clause on what is a permission in one of these versions.
-    fn not_permitted(&mut self, id: &RequirementId, at: &Span, packs: &[usize]) {
-        let permitting = self.vocabulary.requirement(id.as_str()).map(|facts| facts.permitting);
-        let versions = self.vocabulary.versions();
-        let permits = permitting.into_iter().flatten().find(|pack| packs.contains(pack));
-        if let Some(version) = permits.and_then(|pack| versions.get(pack)) {
-            let title = format!("`{id}` is a permission in {version}, and a permission cannot be broken");
-            self.problems.add(
-                Diagnostic::new("permission-judged", at.clone(), title, "this would always pass").hint(
-                    "write `prefers:` or `prefer:` where the catalogue asks for a warning, or take this out of that version by `spec:`",
-                ),
-            );
-        }
-    }
-
-    fn requirement(&mut self, id: &RequirementId, at: &Span, packs: &[usize]) -> Vec<usize> {
-        let Some(facts) = self.vocabulary.requirement(id.as_str()) else {
-            let ids = self.vocabulary.requirements();
-            let near = did_you_mean(
-                id.as_str(),
-                ids.iter().map(String::as_str).filter(|other| close(other, id)),
-            );
-            self.problems.add(
-                Diagnostic::new(
-                    "unknown-requirement",
-                    at.clone(),
-                    format!("unknown requirement `{id}`"),
-                    "not in the catalogue",
-                )
-                .hint(near),
-            );
-            return Vec::new();
-        };
-        if let Some(role) = self.role
-            && !facts.roles.contains(&role)
-        {
-            self.problems.at(
-                "other-role",
-                at,
-                format!("`{id}` does not oblige the {role}"),
-                format!("the {role} is under test here"),
-            );
-        }
-        let having: Vec<usize> = packs
-            .iter()
-            .copied()
-            .filter(|pack| facts.packs.contains(pack))
-            .collect();
-        if having.is_empty() {
-            self.problems.at(
-                "requirement-not-in-version",
-                at,
-                format!("no version claimed here has `{id}`"),
-                "would never be decided",
-            );
-        }
-        having
-    }
-
     /// Checks what a requirement of a monitor is about.
     fn about(&mut self, about: &About, monitor: &Monitor, scope: &Scope<'_>, packs: &[usize]) {
         let Binding { requirement, span } = &about.requirement;
@@ -614,10 +546,4 @@ impl<'a> Linter<'a> {
             );
         }
     }
-}
-
-/// Whether an id of the catalogue is of the same group, so that the hint stays short.
-fn close(other: &str, id: &RequirementId) -> bool {
-    let group = |id: &str| id.rsplit_once('-').map(|(group, _)| group.to_owned());
-    group(other) == group(id.as_str()) || strsim::levenshtein(other, id.as_str()) <= 2
 }

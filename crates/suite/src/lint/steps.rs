@@ -3,9 +3,7 @@
 use super::paths::Topic;
 use super::scope::Scope;
 use super::{Linter, within};
-use crate::model::{
-    Assertion, Binding, Extent, Patch, Path, Section, Selection, Send, Step, VehicleStep, Verb, Walk, Which,
-};
+use crate::model::{Binding, Extent, Patch, Path, Section, Send, Step, VehicleStep, Verb, Walk, Which};
 use tck_base::diagnostic::{Diagnostic, Span};
 use tck_base::pattern::{Term, TermKind};
 use tck_journal::event::LinkFault;
@@ -99,39 +97,6 @@ impl Linter<'_> {
             Verb::Operator(operator) => self.operator(operator, at),
             Verb::Vehicle(vehicle) => self.vehicle(vehicle, step),
             Verb::Serve(_) => {}
-        }
-    }
-
-    /// Nothing breaks a permission: a picture that is bound to one would pass whatever comes. A named check says by itself
-    /// what it remarks on.
-    fn can_be_broken(&mut self, step: &Step, packs: &[usize]) {
-        let named = |selection: &Selection| selection.check.is_some();
-        let mut bound: Vec<&Binding> = Vec::new();
-        let mut asserted: &[Assertion] = &[];
-        match &*step.verb {
-            Verb::Expect(expect) => {
-                asserted = &expect.assert;
-                bound.extend(expect.checks.iter().filter(|_| !named(&expect.selection)));
-            }
-            Verb::Never(never) => bound.extend(never.checks.iter().filter(|_| !named(&never.selection))),
-            Verb::Always(always) => {
-                bound.extend(always.checks.iter().filter(|_| !named(&always.selection)));
-                if let Extent::Until(until) = &always.extent {
-                    bound.extend(until.checks.iter().filter(|_| !named(&until.selection)));
-                }
-            }
-            Verb::Action(action) => bound.extend(&action.checks),
-            Verb::Retained(retained) => {
-                asserted = &retained.assert;
-                bound.extend(retained.checks.iter().filter(|_| !named(&retained.selection)));
-            }
-            Verb::Send(_) | Verb::Link(_) | Verb::Serve(_) | Verb::Operator(_) | Verb::Vehicle(_) => {}
-        }
-        for Binding { requirement, span } in bound.into_iter().filter(|_| !step.prefers) {
-            self.not_permitted(requirement, span, packs);
-        }
-        for assertion in asserted.iter().filter(|one| !named(&one.selection)) {
-            self.not_permitted(&assertion.requirement, &assertion.span, packs);
         }
     }
 

@@ -86,6 +86,7 @@ records! {
     fault "visualization-of-a-coming-state" ["VIS-04"] "Its visualization names a state that it has not sent yet."
         => visualization(|_, m| number(m, "referenceStateHeaderId", |id| id + 50.0));
     fault "visualization-of-the-first-state" ["VIS-04"] "Its visualization names the first state that it has ever sent."
+        because "An old state that was sent is a warning, one that was never sent a failure (VIS-04)."
         => visualization(|_, m| m.set("referenceStateHeaderId", 0));
 
     fault "lost-without-an-error" ["STATE-MSG-19"] "It says that it is not localized and reports no error."

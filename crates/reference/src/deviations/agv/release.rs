@@ -102,6 +102,7 @@ records! {
             true
         });
     fault "release-request-left-behind" ["ZREQ-10", "REQ-15"] "It goes on listing a request for a RELEASE zone that it has left."
+        because "A request that stays in the list after the zone is a warning (ZREQ-10)."
         => keep::<Vec<(String, String)>>()
             .allows(|_, agv, what, usual| match what {
                 Permission::KeepZoneRequest(request) => usual || agv.mode.takes_orders() && !agv.order.cancelled && request.inside,

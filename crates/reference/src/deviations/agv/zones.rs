@@ -161,6 +161,7 @@ records! {
             words.remove("zoneActionStates");
         });
     fault "empty-zone-requests-left-out" ["STATE-MSG-22"] "It leaves zoneRequests out where it asks for no zone."
+        because "STATE-MSG-22 is a recommendation."
         => state(|_, words| if words.list("zoneRequests").is_empty() {
             words.remove("zoneRequests");
         });
@@ -192,6 +193,7 @@ records! {
             _ => usual,
         });
     fault "line-guided-zones-cut" ["ZONE-07"] "Does not follow trajectories in LINE_GUIDED zones."
+        because "It cuts the curves of the reference floor by less than what tells plain disregard from a small excursion."
         => plain().bends(|_, agv, _, path| {
             let zones = agv.zone_sets.all.iter().filter(|set| set.enabled).flat_map(|set| &set.zones);
             let guided = zones.into_iter().any(|zone| zone.kind == ZoneKind::LineGuided);

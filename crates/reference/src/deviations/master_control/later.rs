@@ -26,7 +26,6 @@ records! {
     fault "turned-before-every-edge" ["ORD-MSG-34", "OPT-03"] "It has every vehicle turn to its orientation before each edge."
         => edge(|e| e.set("reachOrientationBeforeEntering", true));
     fault "orientation-always-global" ["ORD-MSG-34"] "Edges have an orientation on the map for every kind of vehicle."
-        because "The ruling of ORD-MSG-34 makes it a warning where the factsheet lists the field, as that of the vehicles does."
         => edge(|e| {
             e.set("orientation", 0.0);
             e.set("orientationType", "GLOBAL");
