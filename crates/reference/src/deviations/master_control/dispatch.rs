@@ -174,6 +174,29 @@ records! {
         => at_any_time(|_, occasion| matches!(occasion, Occasion::Update { asked: true, .. }));
     fault "interval-not-after-cancel" ["FACT-13"] "The first order after a cancellation is sent without regard to minOrderInterval."
         => at_any_time(|called_off, occasion| called_off && occasion == Occasion::New);
+    fault "order-and-updates-in-a-burst" ["FACT-13"] "It sends an order and the first two updates of it within a tenth of a second, whatever the minOrderInterval."
+        => keep::<(u32, Option<Moment>)>().happens(|(updates, begun), site, vehicle, event| match event {
+            Event::Begun => {
+                (*updates, *begun) = (0, Some(site.now.moment));
+                vehicle.at(site.now.moment);
+            }
+            Event::Updated(..) => {
+                *updates += 1;
+                vehicle.at(site.now.moment);
+            }
+            _ => {}
+        }).judges(|burst, site, _, running, _, fate| {
+            // It does not wait until the message before is seen.
+            running.confirmed |= fate == Fate::Runs && bursts(burst, site) && !running.is_whole();
+            fate
+        }).allows(|burst, site, _, what, usual| usual || matches!(what, Permission::Grow(running, ..) if bursts(burst, site) && !running.is_whole()))
+        .measures(|burst, site, _, what, usual| match what {
+            Measure::Base(running, free, _) if bursts(burst, site) => usual.max(running.released + 1).min(free),
+            _ => usual,
+        }).lasts(|burst, site, _, what, usual| match what {
+            Span::Interval(Occasion::Update { .. }) if bursts(burst, site) => Duration::ZERO,
+            _ => usual,
+        });
     fault "interval-in-milliseconds" ["FACT-13"] "It takes minOrderInterval for milliseconds."
         => plain().lasts(|(), _, _, what, usual| if let Span::Interval(_) = what { usual / 1000 } else { usual });
     tolerance "answers-slowly" ["ORD-UPD-02"] "Looks at a message half a second after it came."
@@ -274,6 +297,11 @@ fn at_any_time(when: fn(bool, Occasion) -> bool) -> Box<dyn Deviation> {
             Span::Interval(occasion) if when(*called_off, occasion) => Duration::ZERO,
             _ => usual,
         })
+}
+
+/// Whether it still sends updates right behind an order, knowing how many there were and when that began.
+fn bursts((updates, begun): &(u32, Option<Moment>), site: &Site) -> bool {
+    *updates < 2 && begun.is_some_and(|begun| begun + Duration::from_millis(100) > site.now.moment)
 }
 
 fn numbered(id: String, begun: u32) -> String {
