@@ -241,7 +241,8 @@ records! {
         => making(|_, _, a, _, _| a.list("actionParameters").reverse());
     tolerance "several-instant-actions-in-one-message" ["IACT-01"] "It puts stateRequest beside the instant action asked for into one message."
         => sending(|site, vehicle, out| {
-            let asks = out.name == "instantActions" && !out.tells(&["stateRequest"]) && site.offers(vehicle, "stateRequest", "INSTANT");
+            // Whoever asks while he clears the list has to clear it again, for ever.
+            let asks = out.name == "instantActions" && !out.tells(&["stateRequest", "clearInstantActions"]) && site.offers(vehicle, "stateRequest", "INSTANT");
             let limit = vehicle.factsheet.as_ref().map_or(usize::MAX, |sheet| sheet.limit(&["instantActions", "instantActions.actions", "actions"]));
             if asks && out.message.list("actions").len() < limit.min(10) {
                 let question = site.made_action(vehicle, "stateRequest", &Value::Null, true);

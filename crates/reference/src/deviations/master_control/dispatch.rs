@@ -146,8 +146,12 @@ records! {
         => unlimited(|what| matches!(what, Measure::Actions));
     fault "parameter-limit-ignored" ["FACT-12"] "Gives an action more parameters than the vehicle takes."
         => unlimited(|what| matches!(what, Measure::Parameters));
-    tolerance "generous-deviations" ["ORD-MSG-09"] "Nodes without actions have an allowedDeviationXY of 0.8 m where the vehicle supports it."
-        => planning_new(|_, _, way| for stop in way.stops.iter_mut().filter(|stop| stop.actions.is_empty()) { stop.deviation_xy.get_or_insert(0.8); });
+    tolerance "generous-deviations" ["ORD-MSG-09"] "Nodes without actions have an allowedDeviationXY of 0.8 m where the vehicle supports it and has no corridors."
+        => planning_new(|_, vehicle, way| {
+            // Behind a node the vehicle has to be inside of the next corridor (CORR-04).
+            let has_corridors = vehicle.factsheet.as_ref().is_some_and(|sheet| sheet.support("order.edges.corridor").is_some());
+            for stop in way.stops.iter_mut().filter(|stop| !has_corridors && stop.actions.is_empty()) { stop.deviation_xy.get_or_insert(0.8); }
+        });
     tolerance "second-leg-as-update-of-the-completed-order" ["ORD-MSG-02", "ORD-UPD-05"]
         "It sends the way to the first station as an order without horizon and, when that is completed, the rest as an update that begins at the last node."
         => keep::<Option<usize>>().happens(|halt, _, vehicle, event| match event {
