@@ -8,7 +8,7 @@ use super::{Command, Found, allowed, edges_in_sequence, nodes_in_sequence, place
 use crate::finding::{missing_or, quote, show};
 use tck_base::nurbs::Path;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
-use tck_view::{Corridor, Deviation, Edge, Member, Node};
+use tck_view::{Corridor, Deviation, Edge, Member, Node, OrderView};
 use tck_world::ordered::curve;
 use tck_world::{Fact, Listen, Observation, Topic};
 
@@ -16,7 +16,8 @@ use tck_world::{Fact, Listen, Observation, Topic};
 pub(crate) const CORRIDORS: Check = Check {
     name: "commands/corridors",
     decides: &["CORR-02", "CORR-04", "CORR-05", "CORR-09"],
-    doc: "A corridor has a left and a right width of at least 0, not both 0, and a reference point the protocol knows. It \
+    doc: "A corridor has a left and a right width of at least 0, not both 0, and a reference point the protocol knows, under \
+          the name that the version has for it. It \
           comes with a trajectory, unless the vehicle is bound to lines or reports trajectories of its own. Where two \
           corridors meet, the end of the first way lies inside the second corridor; a node that allows a wider \
           deviation than the second corridor, or than both sides of it together, is a warning, and so is one at the first node; so are two corridors \
@@ -78,6 +79,7 @@ impl Running for Corridors {
             return false;
         }
         let mut found = Found::new(record, findings);
+        point_under_its_old_name(record, &mut found);
         let sheets = context.world.factsheets().valid(record, context);
         let bound = self.plans || sheets.is_empty() || sheets.iter().any(|sheet| sheet.line_guided);
         for edge in &edges {
@@ -101,6 +103,25 @@ impl Running for Corridors {
             }
         }
         true
+    }
+}
+
+/// The reference point by the name it had in an earlier version, where the version has another one for it and that is not there.
+fn point_under_its_old_name(record: &Observation<'_>, found: &mut Found<'_>) {
+    let names = record.names();
+    let old = Corridor::reference_point.usual_name();
+    let Some(name) = names.name(Corridor::reference_point).filter(|name| *name != old) else {
+        return;
+    };
+    let edges = record.json().map(|order| names.raw_elements(order, OrderView::edges));
+    for edge in edges.into_iter().flatten() {
+        let corridor = names.raw(edge, &[Edge::corridor]);
+        if corridor.is_some_and(|corridor| corridor.get(old).is_some() && corridor.get(name).is_none()) {
+            let id = names.raw(edge, &[Edge::edge_id]).and_then(Value::as_str);
+            let id = quote(id.unwrap_or_default());
+            let text = format!("the corridor of edge {id} has {old}, which is called {name} in this version");
+            found.broken("CORR-09", text);
+        }
     }
 }
 

@@ -301,7 +301,7 @@ impl Site {
     }
 
     /// Whether two requests are about the same zone of the floor, whatever set it stands in.
-    fn same_zone(&self, one: &Claim, other: &Claim) -> bool {
+    pub(crate) fn same_zone(&self, one: &Claim, other: &Claim) -> bool {
         let (
             Wish::Zone { set_id, zone_id, .. },
             Wish::Zone {

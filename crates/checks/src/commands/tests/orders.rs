@@ -149,6 +149,35 @@ fn curves_that_lead_elsewhere_are_found() {
 }
 
 #[test]
+fn the_reference_point_of_a_corridor_has_the_name_of_its_version() {
+    let corridor = |members: &Value| {
+        let mut trace = Trace::master_control_of("3.0");
+        let place = |x: f64| json!({ "x": x, "y": 2.0, "mapId": "hall" });
+        let corridor = merged(json!({ "leftWidth": 1.0, "rightWidth": 1.0 }), members);
+        let order = json!({
+            "orderId": "o1", "orderUpdateId": 0,
+            "nodes": [
+                { "nodeId": "a", "sequenceId": 0, "released": true, "nodePosition": place(1.0), "actions": [] },
+                { "nodeId": "b", "sequenceId": 2, "released": true, "nodePosition": place(4.0), "actions": [] },
+            ],
+            "edges": [{ "edgeId": "ab", "sequenceId": 1, "released": true, "corridor": corridor, "actions": [] }],
+        });
+        trace.commands("order", &order);
+        trace.judge("commands/corridors").summary()
+    };
+    let point = |name: &str, word: &str| corridor(&json!({ name: word }));
+    assert_eq!(corridor(&json!({})), Vec::<String>::new());
+    assert_eq!(
+        point("corridorReferencePoint", "KINEMATIC_CENTER"),
+        Vec::<String>::new()
+    );
+    assert_eq!(point("corridorRefPoint", "KINEMATICCENTER"), ["CORR-09"]);
+    // Who speaks to both versions may say both.
+    let both = json!({ "corridorRefPoint": "KINEMATICCENTER", "corridorReferencePoint": "KINEMATIC_CENTER" });
+    assert_eq!(corridor(&both), Vec::<String>::new());
+}
+
+#[test]
 fn corridors_that_have_only_the_line_in_common_are_remarked() {
     let corridors = |widths: [(f64, f64); 2], allowed: f64| {
         let mut order = order("o1", 0, 0, 2, 2);

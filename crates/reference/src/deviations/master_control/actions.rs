@@ -15,6 +15,8 @@ records! {
         => action(|a| a.change("blockingType", |blocking| *blocking = json!("EXCLUSIVE")));
     fault "blocking-type-unlisted" ["FACT-15"] "Does not look for blocking types in the factsheet."
         => making(|_, _, a, _, _| a.set("blockingType", "HARD"));
+    fault "order-actions-block-nothing" ["FACT-15"] "Actions of its orders have the blockingType NONE, whatever the factsheet lists for them."
+        => making(|_, _, a, _, instant| if !instant { a.set("blockingType", "NONE"); });
     tolerance "soft-actions" ["FACT-15"] "Uses the blocking type SOFT where the vehicle allows it."
         => making(|_, vehicle, a, _, instant| {
             let listed = vehicle.offer(a.text("actionType")).and_then(|offer| offer.blocking_types.as_deref()).unwrap_or_default();
@@ -164,6 +166,17 @@ records! {
         => parameterless("waitForTrigger", "triggerType");
     fault "null-for-unknown-load-id" ["BP-05"] "It sends the parameter loadId with the value null in a pick, when the load is not known."
         => null_parameter("pick", "loadId");
+    fault "empty-optional-parameters-as-null" ["BP-05", "JSON-06"]
+        "It sends each optional parameter of an action that nobody has given a value for with the value null."
+        => making(|_, vehicle, a, _, _| {
+            let listed = vehicle.offer(a.text("actionType")).and_then(|offer| offer.action_parameters.as_deref()).unwrap_or_default();
+            for offered in listed.iter().filter(|offered| offered.is_optional == Some(true)) {
+                a.supply("actionParameters", json!([]));
+                if !a.list("actionParameters").iter().any(|parameter| parameter["key"] == offered.key) {
+                    a.add("actionParameters", json!({ "key": offered.key, "value": null }));
+                }
+            }
+        });
     fault "empty-map-hash-as-null" ["BP-05"] "It sends mapHash with the value null when it has no hash."
         => null_parameter("downloadMap", "mapHash");
     fault "zero-pose-members-left-out" ["ACT-31"] "It leaves those of x, y and theta out of initPosition that are zero."
@@ -228,7 +241,8 @@ records! {
         => making(|_, _, a, _, _| a.list("actionParameters").reverse());
     tolerance "several-instant-actions-in-one-message" ["IACT-01"] "It puts stateRequest beside the instant action asked for into one message."
         => sending(|site, vehicle, out| {
-            let asks = out.name == "instantActions" && !out.tells(&["stateRequest"]) && site.offers(vehicle, "stateRequest", "INSTANT");
+            // Whoever asks while he clears the list has to clear it again, for ever.
+            let asks = out.name == "instantActions" && !out.tells(&["stateRequest", "clearInstantActions"]) && site.offers(vehicle, "stateRequest", "INSTANT");
             let limit = vehicle.factsheet.as_ref().map_or(usize::MAX, |sheet| sheet.limit(&["instantActions", "instantActions.actions", "actions"]));
             if asks && out.message.list("actions").len() < limit.min(10) {
                 let question = site.made_action(vehicle, "stateRequest", &Value::Null, true);

@@ -180,6 +180,21 @@ records! {
         });
     tolerance "updates-without-horizon" ["ORD-UPD-03", "ORD-09"] "Order updates hold the new base only and delete the horizon."
         => showing(|_, running, window, _| if running.released > 0 && window.released > running.released { window.end = window.released; });
+    tolerance "horizon-swapped-or-deleted" ["ORD-UPD-03", "ORD-UPD-04"]
+        "Each update deletes the horizon or shows another way to the goal there, and the next one goes on by the way of the order."
+        => plain().words(|(), site, vehicle, worded, m| {
+            let window = worded.window;
+            if !worded.is_update() || window.end <= window.released { return; }
+            if worded.running.update_id % 2 == 1 {
+                for list in ["nodes", "edges"] { m.keep(list, |element| element.says("released", true)); }
+                return;
+            }
+            let Some(other) = other_horizon(site, vehicle, worded) else { return };
+            let end = window.end.min(other.stops.len());
+            if let Some((mut message, _)) = site.order_message(vehicle, &other, Window { end, ..window }) {
+                for list in ["nodes", "edges"] { m.set(list, message[list].take()); }
+            }
+        });
     tolerance "horizon-sent-again" ["ORD-UPD-03", "ORD-UPD-05"] "Once in an order it sends an order update that extends nothing and gives the same horizon again."
         => keep::<bool>().happens(|sent, _, _, event| match event {
             Event::Extending(running) if !*sent && !running.is_whole() => {
@@ -286,6 +301,27 @@ fn paused_with_it(paused: &mut bool, _: &mut Site, vehicle: &mut Vehicle, event:
         Event::Begun => *paused = false,
         _ => {}
     }
+}
+
+/// The order as if its horizon led to the goal by another way.
+fn other_horizon(site: &Site, vehicle: &Vehicle, worded: &Worded<'_>) -> Option<Running> {
+    let released = worded.window.released;
+    let mut other = worded.running.clone();
+    let (here, next) = (
+        other.stops.get(released - 1)?.id.clone(),
+        other.stops.get(released)?.id.clone(),
+    );
+    let goal = other.stops.last()?.id.clone();
+    let mut closed = vehicle.blocked.clone();
+    closed.insert((here.clone(), next));
+    let way = site.config.way(&here, &goal, &closed)?;
+    other.stops.truncate(released);
+    other.legs.truncate(released - 1);
+    for edge in way {
+        other.legs.push(Leg::from(edge));
+        other.stops.push(Stop::from(site.config.node(&edge.to)?));
+    }
+    Some(other)
 }
 
 fn without_horizon(due: &bool, _: &Site, _: &Vehicle, what: Permission<'_>, usual: bool) -> bool {

@@ -41,6 +41,21 @@ records! {
             let works = |id: &str| state.action(id).is_some_and(|action| !action.is_terminal());
             !state.driving && then.is_some() && running.action_ids().any(works)
         });
+    fault "withdrawn-order-replaced-without-cancel" ["ORD-CANCEL-01"]
+        "When the transport of a vehicle is withdrawn it sends nothing, and the next transport as a new order while the vehicle drives the old one."
+        => keep::<(bool, bool)>().asked(|(withdrawn, _), _, _, command, _| {
+            *withdrawn = matches!(command, "cancel" | "reroute");
+            true
+        }).happens(|(withdrawn, hasty), site, vehicle, event| match event {
+            Event::Looked => *withdrawn = false,
+            Event::CallingOff(then, sends) if *withdrawn => {
+                **sends = false;
+                *hasty = true;
+                site.drop_order(vehicle, then.take());
+            }
+            Event::Begun => *hasty = false,
+            _ => {}
+        }).allows(|(_, hasty), _, _, what, usual| usual || (*hasty && matches!(what, Permission::Interrupt)));
     fault "paused-order-replaced" ["ORD-CANCEL-01"] "When an order is called off while the vehicle is paused, it sends no cancelOrder, and the next new order at once."
         because "A paused vehicle keeps its base; that ORD-CANCEL-01 asks for cancelOrder before it is replaced is seen from its usual conduct only."
         => replaced(|vehicle, _| vehicle.is_paused());

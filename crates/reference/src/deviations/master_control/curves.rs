@@ -23,6 +23,17 @@ records! {
     fault "degree-is-order" ["ORD-MSG-29"]
         "It sends the order of a curve, one more than its degree, as the degree of a trajectory, so that the knot vector is too short for it."
         => curve(|c| c.set("degree", c["degree"].as_u64().unwrap_or_default() + 1));
+    fault "cubic-of-three-points-on-short-edges" ["ORD-MSG-31"]
+        "Where the vehicle follows trajectories it sends one of degree 3 with three control points for each edge of 2.5 m or less."
+        => filling(|vehicle, field, value| if field.name == "order.edges.trajectory" && field.support.is_some() {
+            let ends = &field.default["controlPoints"];
+            let off = |axis: &str| ends[0][axis].as_f64().unwrap_or_default() - ends[1][axis].as_f64().unwrap_or_default();
+            if off("x").hypot(off("y")) <= 2.5 {
+                let mut cubic = json!({ "degree": 3, "controlPoints": [ends[0], between(&ends[0], &ends[1], 0.5), ends[1]] });
+                if !vehicle.config.has("trajectoryDefaults") { cubic["knotVector"] = json!([0.0, 0.0, 0.0, 0.5, 1.0, 1.0, 1.0]); }
+                *value = Some(cubic);
+            }
+        });
     fault "control-points-as-pairs" ["ORD-MSG-28", "JSON-10"] "Control points of a trajectory are pairs of numbers instead of objects with x and y."
         => curve(|c| c.list("controlPoints").iter_mut().for_each(|point| *point = json!([point["x"], point["y"]])));
     tolerance "weights-left-out" ["ORD-MSG-28"] "Control points have no weight."
@@ -92,6 +103,12 @@ records! {
         => corridor(|c| c.set("corridorRefPoint", "KINEMATIC_CENTER"));
     fault "corridor-point-in-words" ["CORR-09", "JSON-02"] "Names the reference point of corridors in words."
         => corridor(|c| c.set("corridorRefPoint", "kinematic centre"));
+    fault "corridor-members-of-version-2" ["CORR-09"]
+        "It names the reference point of corridors as version 2.1 does: corridorRefPoint with KINEMATICCENTER."
+        => writing("order", |text| {
+            let old = String::from_utf8_lossy(text).replace("corridorReferencePoint", "corridorRefPoint").replace("KINEMATIC_CENTER", "KINEMATICCENTER");
+            *text = old.into_bytes();
+        });
     fault "corridor-widths-as-text" ["CORR-09", "JSON-06", "JSON-10"] "leftWidth and rightWidth of a corridor are strings."
         => corridor(|c| for key in ["leftWidth", "rightWidth"] { c.change(key, |width| *width = json!(width.as_f64().unwrap_or_default().to_string())); });
     fault "corridor-as-one-width" ["CORR-09", "JSON-10"] "It gives a corridor one member width instead of leftWidth and rightWidth."
@@ -118,6 +135,20 @@ records! {
                 }
             });
         });
+    fault "wide-corridor-before-a-narrow-one" ["CORR-04"]
+        "Corridors of 2 m and of 0.1 m to each side take turns, and a node before a narrow one has an allowedDeviationXY of 1.5 m where the vehicle supports that."
+        => composing(|_, vehicle, worded, m| {
+            let sheet = vehicle.factsheet.as_ref();
+            let takes = sheet.is_some_and(|sheet| sheet.support("order.nodes.nodePosition.allowedDeviationXY").is_some());
+            let has_corridors = m.list("edges").iter().any(|edge| edge.get("corridor").is_some());
+            worded.edges(m, |index, _, edge| edge.part("corridor", |corridor| {
+                let side = if index % 2 == 0 { 2.0 } else { 0.1 };
+                widths(corridor, side, side);
+            }));
+            if takes && has_corridors {
+                worded.nodes(m, |index, _, node| if index % 2 == 1 { node.part("nodePosition", |place| place.set("allowedDeviationXY", 1.5)); });
+            }
+        });
     fault "deviation-wider-than-corridor" ["CORR-04", "OPT-03"]
         "It allows a deviation at the node before a corridor that is larger than the whole width of the corridor."
         because "Where the vehicle really passes the node is its own affair, so that CORR-04 leaves a warning."
@@ -136,17 +167,9 @@ records! {
     tolerance "corridor-without-ref-point" ["CORR-09"] "Corridors have no corridorRefPoint."
         => corridor(|c| c.unset("corridorRefPoint"));
     tolerance "corridor-with-one-side-zero" ["CORR-05", "CORR-09"] "It sends a corridor with width only to the left where there is no room to the right."
-        => composing(|_, vehicle, worded, m| {
-            // No node of the way may allow a deviation, which might lie to the right of the next corridor (CORR-04).
-            let sheet = vehicle.factsheet.as_ref();
-            let demanded = sheet.and_then(|sheet| sheet.support("order.nodes.nodePosition.allowedDeviationXY"));
-            let wide = worded.running.stops.iter().any(|stop| stop.deviation_xy.is_some_and(|metres| metres > 0.0));
-            m.each("edges", |edge| edge.part("corridor", |corridor| {
-                if demanded != Some("REQUIRED") && !wide && let Some((left, right)) = number(corridor, "leftWidth").zip(number(corridor, "rightWidth")) {
-                    widths(corridor, left + right, 0.0);
-                }
-            }));
-        });
+        => to_one_side(|corridor, both| widths(corridor, both, 0.0));
+    tolerance "corridor-to-the-right-only" ["CORR-05", "CORR-09"] "It sends a corridor with width only to the right where there is no room to the left."
+        => to_one_side(|corridor, both| widths(corridor, 0.0, both));
 }
 
 /// Changes every trajectory.
@@ -195,6 +218,25 @@ fn between(from: &Value, to: &Value, share: f64) -> Value {
 fn widths(corridor: &mut Object, left: f64, right: f64) {
     corridor.set("leftWidth", left);
     corridor.set("rightWidth", right);
+}
+
+/// Makes corridors lie to one side, knowing the whole width of each.
+fn to_one_side(lies: fn(&mut Object, f64)) -> Box<dyn Deviation> {
+    holding(lies).words(|lies, _, vehicle, worded, m| {
+        // No node of the way may allow a deviation, which might lie to the other side of the next corridor (CORR-04).
+        let sheet = vehicle.factsheet.as_ref();
+        let demanded = sheet.and_then(|sheet| sheet.support("order.nodes.nodePosition.allowedDeviationXY"));
+        let mut stops = worded.running.stops.iter();
+        let wide = stops.any(|stop| stop.deviation_xy.is_some_and(|metres| metres > 0.0));
+        m.each("edges", |edge| {
+            edge.part("corridor", |corridor| {
+                let widths = number(corridor, "leftWidth").zip(number(corridor, "rightWidth"));
+                if let Some((left, right)) = widths.filter(|_| demanded != Some("REQUIRED") && !wide) {
+                    lies(corridor, left + right);
+                }
+            });
+        });
+    })
 }
 
 fn curveless(edge: &mut Object) {

@@ -146,8 +146,12 @@ records! {
         => unlimited(|what| matches!(what, Measure::Actions));
     fault "parameter-limit-ignored" ["FACT-12"] "Gives an action more parameters than the vehicle takes."
         => unlimited(|what| matches!(what, Measure::Parameters));
-    tolerance "generous-deviations" ["ORD-MSG-09"] "Nodes without actions have an allowedDeviationXY of 0.8 m where the vehicle supports it."
-        => planning_new(|_, _, way| for stop in way.stops.iter_mut().filter(|stop| stop.actions.is_empty()) { stop.deviation_xy.get_or_insert(0.8); });
+    tolerance "generous-deviations" ["ORD-MSG-09"] "Nodes without actions have an allowedDeviationXY of 0.8 m where the vehicle supports it and has no corridors."
+        => planning_new(|_, vehicle, way| {
+            // Behind a node the vehicle has to be inside of the next corridor (CORR-04).
+            let has_corridors = vehicle.factsheet.as_ref().is_some_and(|sheet| sheet.support("order.edges.corridor").is_some());
+            for stop in way.stops.iter_mut().filter(|stop| !has_corridors && stop.actions.is_empty()) { stop.deviation_xy.get_or_insert(0.8); }
+        });
     tolerance "second-leg-as-update-of-the-completed-order" ["ORD-MSG-02", "ORD-UPD-05"]
         "It sends the way to the first station as an order without horizon and, when that is completed, the rest as an update that begins at the last node."
         => keep::<Option<usize>>().happens(|halt, _, vehicle, event| match event {
@@ -174,6 +178,29 @@ records! {
         => at_any_time(|_, occasion| matches!(occasion, Occasion::Update { asked: true, .. }));
     fault "interval-not-after-cancel" ["FACT-13"] "The first order after a cancellation is sent without regard to minOrderInterval."
         => at_any_time(|called_off, occasion| called_off && occasion == Occasion::New);
+    fault "order-and-updates-in-a-burst" ["FACT-13"] "It sends an order and the first two updates of it within a tenth of a second, whatever the minOrderInterval."
+        => keep::<(u32, Option<Moment>)>().happens(|(updates, begun), site, vehicle, event| match event {
+            Event::Begun => {
+                (*updates, *begun) = (0, Some(site.now.moment));
+                vehicle.at(site.now.moment);
+            }
+            Event::Updated(..) => {
+                *updates += 1;
+                vehicle.at(site.now.moment);
+            }
+            _ => {}
+        }).judges(|burst, site, _, running, _, fate| {
+            // It does not wait until the message before is seen.
+            running.confirmed |= fate == Fate::Runs && bursts(burst, site) && !running.is_whole();
+            fate
+        }).allows(|burst, site, _, what, usual| usual || matches!(what, Permission::Grow(running, ..) if bursts(burst, site) && !running.is_whole()))
+        .measures(|burst, site, _, what, usual| match what {
+            Measure::Base(running, free, _) if bursts(burst, site) => usual.max(running.released + 1).min(free),
+            _ => usual,
+        }).lasts(|burst, site, _, what, usual| match what {
+            Span::Interval(Occasion::Update { .. }) if bursts(burst, site) => Duration::ZERO,
+            _ => usual,
+        });
     fault "interval-in-milliseconds" ["FACT-13"] "It takes minOrderInterval for milliseconds."
         => plain().lasts(|(), _, _, what, usual| if let Span::Interval(_) = what { usual / 1000 } else { usual });
     tolerance "answers-slowly" ["ORD-UPD-02"] "Looks at a message half a second after it came."
@@ -274,6 +301,11 @@ fn at_any_time(when: fn(bool, Occasion) -> bool) -> Box<dyn Deviation> {
             Span::Interval(occasion) if when(*called_off, occasion) => Duration::ZERO,
             _ => usual,
         })
+}
+
+/// Whether it still sends updates right behind an order, knowing how many there were and when that began.
+fn bursts((updates, begun): &(u32, Option<Moment>), site: &Site) -> bool {
+    *updates < 2 && begun.is_some_and(|begun| begun + Duration::from_millis(100) > site.now.moment)
 }
 
 fn numbered(id: String, begun: u32) -> String {

@@ -7,6 +7,8 @@ records! {
         => element(|element| element.rename("sequenceId", "sequence_id"));
     fault "lower-case-enums" ["JSON-02", "ORD-MSG-16"] "Writes blocking types in small letters."
         => action(|a| a.change("blockingType", |b| *b = json!(b.as_str().unwrap_or_default().to_ascii_lowercase())));
+    fault "blocking-types-in-mixed-case" ["JSON-02", "ORD-MSG-16"] "It writes the blockingType of actions in orders as None, Soft, Single and Hard."
+        => action_of("order", |a| a.change("blockingType", |b| *b = json!(capitalized(&b.as_str().unwrap_or_default().to_ascii_lowercase()))));
     fault "instant-actions-pascal-case" ["JSON-01", "ORD-MSG-15", "IACT-01"]
         "It writes the members of instant actions with a capital first letter, such as ActionType."
         => action_of("instantActions", |a| *a = std::mem::take(a).into_iter().map(|(key, value)| (capitalized(&key), value)).collect());
@@ -96,6 +98,11 @@ records! {
         });
     tolerance "vendor-fields" ["JSON-10"] "Adds members of its own to every message."
         => every(|m| m.set("vendorTrace", json!({ "thread": 4, "module": "dispatcher" })));
+    tolerance "own-members-in-orders-and-nodes" ["JSON-10"] "It adds a member of its own to orders and to each of their nodes."
+        => order(|m| {
+            m.set("customerReference", "4711");
+            m.each("nodes", |node| node.set("customerReference", "4711"));
+        });
     tolerance "keys-reordered" ["HDR-01"] "Sends the members of its messages in reverse order."
         => sending(|_, _, out| out.message = std::mem::take(&mut out.message).into_iter().rev().collect());
     tolerance "members-reversed-inside" ["HDR-01"] "It writes the members of all objects in the opposite order, the header last."

@@ -1,6 +1,8 @@
 //! Deviations of what only later versions ask of a master control: sleep, triggers, retries, lists that are cleared, orders that
 //! begin with update 0, certificates.
 
+use crate::master_control::seen::ActionState;
+
 use super::prelude::*;
 
 records! {
@@ -25,6 +27,13 @@ records! {
         => action(|a| a.change("retriable", |retriable| *retriable = json!(retriable.to_string())));
     fault "turned-before-every-edge" ["ORD-MSG-34", "OPT-03"] "It has every vehicle turn to its orientation before each edge."
         => edge(|e| e.set("reachOrientationBeforeEntering", true));
+    fault "turned-to-the-map-before-every-edge" ["ORD-MSG-34"]
+        "It sends orientationType GLOBAL with reachOrientationBeforeEntering on every edge, also to a DIFFERENTIAL vehicle that does not list them."
+        => edge(|e| {
+            e.set("orientation", 0.0);
+            e.set("orientationType", "GLOBAL");
+            e.set("reachOrientationBeforeEntering", true);
+        });
     fault "orientation-always-global" ["ORD-MSG-34"] "Edges have an orientation on the map for every kind of vehicle."
         => edge(|e| {
             e.set("orientation", 0.0);
@@ -59,6 +68,23 @@ records! {
             }
             *done &= asleep(vehicle);
         }).allows(|_, _, vehicle, what, usual| usual || asleep(vehicle) && matches!(what, Permission::Tell("cancelOrder")));
+    fault "sleep-taken-for-a-fault-after-a-minute" ["HIB-14", "HIB-13"]
+        "When a vehicle that sleeps has sent no state for a minute it sends cancelOrder and stateRequest, and again every ten seconds."
+        => keep::<Option<Moment>>().happens(|due, site, vehicle, event| match event {
+            Event::State(_) => *due = None,
+            Event::Looked if !asleep(vehicle) => *due = None,
+            Event::Looked => {
+                let now = site.now.moment;
+                let at = *due.get_or_insert(vehicle.state_at + Duration::from_secs(60));
+                if at <= now {
+                    let actions = ["cancelOrder", "stateRequest"].map(|kind| site.made_action(vehicle, kind, &Value::Null, true));
+                    site.publish(vehicle, "instantActions", &json!({ "actions": actions }));
+                    *due = Some(now + Duration::from_secs(10));
+                }
+                due.into_iter().for_each(|at| vehicle.at(*at));
+            }
+            _ => {}
+        });
     fault "shuts-down-the-sleeping" ["SHUT-03", "HIB-13"] "It sends shutdown to a vehicle that sleeps without waking it."
         => allowing(|vehicle, what, usual| match what {
             Permission::Tell("shutdown") if asleep(vehicle) => true,
@@ -118,6 +144,13 @@ records! {
         }));
     fault "trigger-never-given" ["TRIG-04"] "It does not send trigger when the process is done that was awaited."
         => asked("give-trigger", |_, _, _| false);
+    fault "trigger-with-the-order" ["TRIG-04"]
+        "It sends trigger once, directly after an order with a waitForTrigger, and not when the process is done that was awaited."
+        => plain().happens(|(), site, vehicle, event| if let Event::Begun = event {
+            let stops = vehicle.running.iter().flat_map(|running| &running.stops);
+            let waits = stops.flat_map(|stop| &stop.actions).any(|action| action["actionType"] == "waitForTrigger");
+            if waits { site.instant(vehicle, "trigger", &Value::Null); }
+        }).asked(|(), _, _, command, _| command != "give-trigger");
     fault "trigger-by-the-order-topic" ["TRIG-04"] "It ends the wait for a trigger by calling the order off."
         => asked("give-trigger", |site, vehicle, _| {
             site.call_off(vehicle);
@@ -125,6 +158,21 @@ records! {
         });
     fault "commands-a-vehicle-in-someones-hands" ["MODE-11"] "It sends instant actions to a vehicle in INTERVENED."
         => letting(|_, vehicle, what| mode(vehicle) == "INTERVENED" && matches!(what, Permission::Tell(_)));
+    fault "pauses-a-vehicle-in-someones-hands" ["MODE-11"] "It sends startPause as soon as a vehicle reports INTERVENED, and stopPause when it is back."
+        => happening(|site, vehicle, event| if let Event::State(Some(before)) = event {
+            let (was, is) = (before.operating_mode == "INTERVENED", mode(vehicle) == "INTERVENED");
+            let kind = if is { "startPause" } else { "stopPause" };
+            if was != is && site.reachable(vehicle) && site.offers(vehicle, kind, "INSTANT") {
+                let action = site.made_action(vehicle, kind, &Value::Null, true);
+                site.publish(vehicle, "instantActions", &json!({ "actions": [action] }));
+            }
+        });
+    tolerance "orders-in-someones-hands" ["MODE-11", "MODE-04"] "It sends orders, updates and cancelOrder, and no other instant action, to a vehicle in INTERVENED."
+        => allowing(|vehicle, what, usual| match what {
+            Permission::Command => usual || mode(vehicle) == "INTERVENED",
+            Permission::Tell(kind) if mode(vehicle) == "INTERVENED" => usual && kind == "cancelOrder",
+            _ => usual,
+        });
     fault "startup-ignored" ["MODE-04"] "It takes STARTUP for AUTOMATIC."
         => letting(|_, vehicle, what| mode(vehicle) == "STARTUP" && matches!(what, Permission::Command));
     fault "critical-charge-ignored" ["FACT-17"] "It begins a transport however low the battery is."
@@ -132,6 +180,23 @@ records! {
         => forbidding(|_, _, what| matches!(what, Permission::Starve));
     tolerance "lists-cleared-late" ["IACT-STATE-07"] "It has the list of instant actions cleared only when the vehicle has nothing to do."
         => forbidding(|_, vehicle, what| vehicle.running.is_some() && matches!(what, Permission::Clear(_)));
+    tolerance "lists-cleared-on-nodes" ["ACT-08", "IACT-STATE-07", "ZACT-STATE-08"]
+        "It has the lists of actions cleared by actions on the first node of the next order, where the vehicle offers that."
+        => plain().allows(|(), site, vehicle, what, usual| match what {
+            Permission::Clear(kind) => usual && !site.offers(vehicle, kind, "NODE"),
+            _ => usual,
+        }).plans(|(), site, vehicle, way, _, fresh| {
+            let Some(state) = vehicle.state.as_ref().filter(|_| fresh && vehicle.config.has("instantActionStates")) else { return };
+            let lists = [("clearInstantActions", &state.instant_action_states), ("clearZoneActions", &state.zone_action_states)];
+            let ended = |list: &[ActionState]| !list.is_empty() && list.iter().all(ActionState::is_terminal);
+            let kinds: Vec<&str> = lists.into_iter().filter(|(kind, list)| ended(list) && site.offers(vehicle, kind, "NODE")).map(|(kind, _)| kind).collect();
+            for kind in kinds {
+                let action = site.action(vehicle, kind, &Value::Null);
+                if let Some(first) = way.stops.first_mut() { first.actions.insert(0, action); }
+            }
+        });
+    tolerance "trigger-types-mixed" ["TRIG-03", "ACT-31"] "Its triggerType has a word of its own beside FLEET_CONTROL and LOCAL."
+        => parameter_of("triggerType", |p| p.change("value", |value| if value.is_array() { *value = json!(["FLEET_CONTROL", "LOCAL", "DOOR_OPEN"]); }));
     tolerance "cancels-without-name" ["ORD-CANCEL-23"] "cancelOrder names no order."
         => typed("cancelOrder", |a| a.unset("actionParameters"));
     tolerance "never-asks-for-retries" ["ORD-MSG-35"] "It sends no action as retriable."

@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use crate::master_control::config::SiteMap;
 use crate::master_control::maps::is_duplicate;
 use crate::master_control::seen::MapSeen;
 use crate::master_control::vehicle::{MapJob, Stage};
@@ -45,6 +46,29 @@ records! {
     fault "enable-before-download" ["MAP-10"] "It sends enableMap for a map it rolls out before downloadMap."
         because "MAP-10 recommends that a map is on board before it is activated, and obliges nobody."
         => happening(|site, vehicle, event| if let Event::RollOut(map, _) = event { site.map_action(vehicle, "enableMap", &map.map_id, &map.map_version); });
+    fault "order-before-the-download-has-ended" ["MAP-10", "MAP-09"]
+        "It sends enableMap, and an order on the map, right after downloadMap and does not wait for the end of that."
+        => keep::<BTreeSet<String>>().happens(|enabled, site, vehicle, event| if let Event::Looked = event {
+            let loading: Vec<MapJob> = vehicle.jobs.iter().filter(|job| is_loading(vehicle, job) && !enabled.contains(&job.action_id)).cloned().collect();
+            for job in loading {
+                enabled.insert(job.action_id);
+                site.map_action(vehicle, "enableMap", &job.map.map_id, &job.map.map_version);
+                site.send_instants(vehicle);
+            }
+        }).allows(|_, _, vehicle, what, usual| {
+            usual || matches!(what, Permission::UseMap(map_id, _) if vehicle.jobs.iter().any(|job| job.map.map_id == map_id && is_loading(vehicle, job)))
+        });
+    fault "map-downloaded-by-the-order" ["ACT-08", "FACT-15"]
+        "It sends an order on a map that the vehicle does not have, with downloadMap as an action of its first node."
+        => plain().plans(|(), site, vehicle, way, _, fresh| {
+            let missing = way.stops.iter().map(|stop| &stop.map_id).find(|map_id| fresh && is_missing(vehicle, map_id));
+            let Some(map_id) = missing.cloned() else { return };
+            let known = site.config.maps.iter().find(|map| map.map_id == map_id);
+            let (version, link) = known.map_or_else(|| ("1".to_owned(), format!("http://127.0.0.1:8090/maps/{map_id}")), |map| (map.map_version.clone(), map.link.clone()));
+            let given = json!({ "mapId": map_id, "mapVersion": version, "mapDownloadLink": link });
+            let action = site.action(vehicle, "downloadMap", &given);
+            way.stops[0].actions.push(action);
+        }).allows(|(), _, vehicle, what, usual| usual || matches!(what, Permission::UseMap(map_id, _) if is_missing(vehicle, map_id)));
     tolerance "on-board-map-deleted-first" ["MAP-28"]
         "It deletes a disabled map that is on board already before it has it downloaded again, without waiting for a rejection."
         => happening(|site, vehicle, event| if let Event::RollOut(map, done) = event {
@@ -71,6 +95,26 @@ records! {
         => made_of("downloadMap", |_, a| a.keep("actionParameters", |parameter| !parameter.says("key", "mapHash")));
     fault "download-repeated" ["MAP-28"] "Repeats a download that was refused as a duplicate without deleting the map."
         => on_duplicate(|site, vehicle, job| download_again(site, vehicle, job));
+    fault "download-repeated-every-ten-seconds" ["MAP-28"]
+        "It sends a download that was refused as a duplicate again every ten seconds and never deletes the map."
+        => keep::<Vec<(Moment, SiteMap)>>().happens(|again, site, vehicle, event| match event {
+            Event::RolledOut(job, false, next, done) => if job.stage != Stage::Delete && is_duplicate(vehicle, job) {
+                again.push((site.now.moment + Duration::from_secs(10), job.map.clone()));
+                **next = None;
+                **done = true;
+            },
+            Event::Looked => {
+                let now = site.now.moment;
+                let (due, later): (Vec<_>, Vec<_>) = std::mem::take(again).into_iter().partition(|(at, _)| *at <= now);
+                for (_, map) in due {
+                    let sent = site.send_download(vehicle, &map);
+                    if let Some(action_id) = sent { vehicle.jobs.push(MapJob { map, stage: Stage::Download, action_id }); }
+                }
+                later.iter().for_each(|(at, _)| vehicle.at(*at));
+                *again = later;
+            }
+            _ => {}
+        });
     fault "duplicate-kept-during-order" ["MAP-28"]
         "It repeats a download that was rejected as a duplicate without deleting the map first if the vehicle drives an order."
         => happening(|site, vehicle, event| if let Event::RolledOut(job, false, next, done) = event {
@@ -228,6 +272,18 @@ fn on_duplicate(does: AfterDuplicate) -> Box<dyn Deviation> {
 fn download_again(site: &mut Site, vehicle: &mut Vehicle, job: &mut MapJob) -> Option<String> {
     job.stage = Stage::DownloadAgain;
     site.send_download(vehicle, &job.map)
+}
+
+/// Whether a download was sent and has not ended.
+fn is_loading(vehicle: &Vehicle, job: &MapJob) -> bool {
+    let mut instants = vehicle.instants.iter();
+    job.stage != Stage::Delete && instants.any(|instant| instant.id() == job.action_id && instant.sent_at.is_some())
+}
+
+/// Whether the vehicle says which maps it has, and this is none of them.
+fn is_missing(vehicle: &Vehicle, map_id: &str) -> bool {
+    let maps = vehicle.state.as_ref().and_then(|state| state.maps.as_ref());
+    vehicle.config.has("mapActions") && maps.is_some_and(|maps| maps.iter().all(|map| map.map_id != map_id))
 }
 
 fn on_board(vehicle: &Vehicle) -> impl Iterator<Item = &MapSeen> {

@@ -39,6 +39,7 @@ mod sending;
 mod starts;
 #[cfg(test)]
 mod tests;
+mod traffic;
 mod transport;
 mod updates;
 mod zones;
@@ -75,6 +76,7 @@ const RECORDS: Records<dyn Deviation> = Records(&[
     dispatch::RECORDS,
     base::RECORDS,
     updates::RECORDS,
+    traffic::RECORDS,
     sending::RECORDS,
     cancellation::RECORDS,
     actions::RECORDS,

@@ -20,6 +20,15 @@ records! {
     fault "order-ids-from-the-start-after-reconnect" ["ORD-MSG-02"]
         "It counts its order numbers from the start after its own connection to the broker was lost, so that an orderId returns for another order."
         => counting("order", |event| matches!(event, Event::Connected(true)));
+    fault "order-ids-from-one-after-each-start" ["ORD-MSG-02"]
+        "It counts its orderIds from order-1 on after each start, so that one returns for another order after a restart."
+        => fleet::<u64>().commanded(|count, _, _, command, _| {
+            if command == "start" { *count = 0; }
+            true
+        }).names(|count, site, vehicle, what, id| if what == "order" {
+            *count += 1;
+            *id = site.fitting(vehicle, what, format!("order-{count}"), *count);
+        });
     tolerance "plain-number-ids" ["ORD-MSG-02", "ORD-MSG-17", "JSON-04"] "It makes orderIds and actionIds of digits only."
         => plain().names(|(), site, vehicle, what, id| *id = site.fitting(vehicle, what, format!("{}{:05}", site.session, site.ids), site.ids));
     tolerance "uuid-ids" ["ORD-MSG-17", "JSON-04"] "Ids of orders, actions and temporary elements look like UUIDs where the vehicle allows their length."
@@ -178,6 +187,13 @@ records! {
         => dangling(|_| true);
     fault "cut-leaves-a-dangling-edge" ["ORD-02"] "It cuts an order that is too long for the vehicle behind the edge, so that the message has as many edges as nodes."
         => dangling(|worded| worded.cut);
+    fault "closing-edge-in-round-trips" ["ORD-02"]
+        "An order that leads back to where it begins ends with the edge to the first node, without that node once more, so that it has as many edges as nodes."
+        => composing(|_, _, worded, m| {
+            let stops = &worded.running.stops;
+            let back = stops.len() > 2 && stops.first().map(|stop| &stop.id) == stops.last().map(|stop| &stop.id);
+            if back && worded.window.end >= stops.len() { m.change("nodes", |nodes| drop(nodes.as_array_mut().and_then(Vec::pop))); }
+        });
     fault "self-edge" ["ORD-02", "ORD-MSG-06"] "An order of one node has an edge from that node to itself."
         => composing(|_, _, worded, m| {
             if let [stop] = worded.running.stops.as_slice() && !worded.is_update() {

@@ -98,6 +98,15 @@ records! {
             if !low { *last = count.or(*last); }
             !low
         });
+    fault "connection-message-dropped-as-outdated" ["CONN-13", "CONN-12"]
+        "It drops a connection message whose headerId or timestamp is older than that of the one before, a last will among them."
+        because "CONN-13 describes that headerId and timestamp of last wills are old, and recommends to bear it."
+        => keep::<(u64, String)>().hears(|(count, last), _, _, heard| {
+            let (new, stamp) = (heard.message["headerId"].as_u64().unwrap_or_default(), stamp(heard));
+            let old = heard.name == "connection" && (new < *count || stamp < *last);
+            if heard.name == "connection" && !old { (*count, *last) = (new, stamp); }
+            !old
+        });
     fault "will-older-than-state-ignored" ["CONN-13"] "It ignores CONNECTIONBROKEN whose timestamp is older than that of the last state."
         because "CONN-13 describes that timestamps of last wills are older than the last state, and recommends to bear it."
         => keep::<String>().hears(|last, _, _, heard| {
@@ -145,19 +154,10 @@ records! {
         => happening(|site, vehicle, event| if let Event::Away(true, _) = event { say_connection(site, vehicle, "OFFLINE"); });
     fault "publishes-connection-for-silent-vehicle" ["TOPIC-15"]
         "It publishes CONNECTIONBROKEN on the vehicle's connection topic itself when no state came for a while."
-        => keep::<bool>().happens(|said, site, vehicle, event| match event {
-            Event::State(_) => *said = false,
-            Event::Looked if !*said && vehicle.presence == Presence::Online && vehicle.state.is_some() => {
-                let due = vehicle.state_at + Duration::from_secs(10);
-                if due > site.now.moment {
-                    vehicle.at(due);
-                } else {
-                    *said = true;
-                    say_connection(site, vehicle, "CONNECTIONBROKEN");
-                }
-            }
-            _ => {}
-        });
+        => silence_published(10, "CONNECTIONBROKEN");
+    fault "offline-published-after-a-silent-minute" ["TOPIC-15"]
+        "It publishes a retained OFFLINE on the connection topic of a vehicle that is connected and has sent no state for a minute."
+        => silence_published(60, "OFFLINE");
     fault "clears-the-will" ["TOPIC-15"]
         "It removes the retained CONNECTIONBROKEN of a vehicle by publishing an empty retained message on the connection topic of the vehicle."
         => happening(|site, vehicle, event| if let Event::Away(true, _) = event { clear_connection(site, vehicle); });
@@ -352,6 +352,23 @@ fn say_connection(site: &mut Site, vehicle: &mut Vehicle, state: &str) {
         message.set("connectionState", state);
         site.push(topic, Value::Object(message).to_string().into_bytes(), 1, true);
     }
+}
+
+/// Says this on the connection topic of a vehicle that is connected and has sent no state for so many seconds.
+fn silence_published(seconds: u64, word: &'static str) -> Box<dyn Deviation> {
+    each((seconds, word, false)).happens(|(seconds, word, said), site, vehicle, event| match event {
+        Event::State(_) => *said = false,
+        Event::Looked if !*said && vehicle.presence == Presence::Online && vehicle.state.is_some() => {
+            let due = vehicle.state_at + Duration::from_secs(*seconds);
+            if due > site.now.moment {
+                vehicle.at(due);
+            } else {
+                *said = true;
+                say_connection(site, vehicle, word);
+            }
+        }
+        _ => {}
+    })
 }
 
 fn clear_connection(site: &mut Site, vehicle: &Vehicle) {

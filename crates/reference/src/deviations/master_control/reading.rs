@@ -154,6 +154,11 @@ records! {
         });
     fault "information-cancels-order" ["INFO-02"] "It calls the running order off as soon as the state of the vehicle holds any information."
         => looked(|site, vehicle| if informs(vehicle) && vehicle.cancel.is_none() { site.cancel(vehicle, None); });
+    fault "battery-trend-cancels-order" ["INFO-02"] "It calls the running order off when the vehicle publishes an information with the infoType batteryTrend."
+        => looked(|site, vehicle| {
+            let mut told = vehicle.state.iter().flat_map(|state| &state.information).flatten();
+            if told.any(|entry| entry["infoType"] == "batteryTrend") && vehicle.cancel.is_none() { site.cancel(vehicle, None); }
+        });
     fault "information-holds-base" ["INFO-02", "ORD-UPD-02", "STATE-17"] "It does not extend the base while the state carries information."
         => forbidding(|_, vehicle, what| matches!(what, Permission::Extend(_)) && informs(vehicle));
     fault "information-holds-dispatch" ["INFO-02"] "It begins no new order while the state carries information."

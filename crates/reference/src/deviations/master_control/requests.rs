@@ -44,6 +44,32 @@ records! {
             let first = site.config.vehicles.first().and_then(|first| first.topics.get("responses"));
             first.into_iter().for_each(|topic| out.topic.clone_from(topic));
         });
+    fault "answers-to-whoever-has-the-zone" ["REQ-18", "REQ-03"]
+        "What it says to a vehicle that asks for a zone which another one has it publishes on the topic of that other vehicle."
+        => sending(|site, vehicle, out| if out.name == "responses" {
+            let (name, all) = (vehicle.name(), &site.claims.all);
+            let answers = out.message.get("responses").and_then(Value::as_array);
+            let answered = |claim: &&Claim| claim.whose == name && answers.into_iter().flatten().any(|answer| answer["requestId"] == claim.id);
+            let has = |claim: &Claim| all.iter().find(|other| other.whose != name && other.holds() && site.same_zone(claim, other));
+            let holder = all.iter().filter(answered).find_map(has);
+            let known = holder.and_then(|holder| site.config.vehicles.iter().find(|one| holder.whose.ends_with(&format!("/{}", one.serial_number))));
+            let topic = known.and_then(|one| one.topics.get("responses")).cloned();
+            topic.into_iter().for_each(|topic| out.topic = topic);
+        });
+    fault "requests-from-before-the-start-unanswered" ["REQ-03"]
+        "It answers only what vehicles begin to ask for while it runs, and nothing that the first state after its start asks for already."
+        => keep::<Start>().happens(|start, site, vehicle, event| match event {
+            Event::Connected(_) => {
+                // A link that broke is none.
+                start.fresh |= start.losses == site.connection.losses;
+                start.losses = site.connection.losses;
+            }
+            Event::State(_) if std::mem::take(&mut start.fresh) => {
+                let asked = vehicle.state.iter().flat_map(|state| state.requests()).filter(|one| one.request_status == "REQUESTED");
+                start.old = asked.map(|one| one.request_id.clone()).collect();
+            }
+            _ => {}
+        }).decides(|start, _, _, claim, usual| usual.filter(|_| claim.said.is_some() || !start.old.contains(&claim.id)));
     fault "answers-under-the-first-id" ["REQ-03", "REQ-04"] "It answers every request of a vehicle under the requestId of the first one."
         => keep::<Option<String>>().sends(|first, _, _, outgoing| {
             outgoing.message.each("responses", |answer| {
@@ -85,6 +111,12 @@ records! {
         => response(|answer| answer.change("leaseExpiry", |end| *end = json!(20)));
     fault "lease-in-local-time" ["REQ-05"] "leaseExpiry is in local time, two hours ahead, and says so."
         => response(|answer| answer.change("leaseExpiry", |end| *end = json!(end.as_str().unwrap_or_default().replace('Z', "+02:00"))));
+    fault "lease-without-zone" ["REQ-05", "HDR-03"] "leaseExpiry is in local time, two hours ahead, without Z and without offset."
+        => response(|answer| answer.change("leaseExpiry", |end| {
+            let utc = end.as_str().and_then(|text| text.parse::<jiff::Timestamp>().ok());
+            let local = utc.and_then(|utc| utc.checked_add(jiff::SignedDuration::from_hours(2)).ok());
+            if let Some(local) = local { *end = json!(format!("{local:.0}").replace('Z', "")); }
+        }));
     fault "lease-already-over" ["REQ-05"] "The lease of a grant has ended an hour before it comes."
         because "A time that has passed is a warning by the catalogue."
         => holding(()).sends(|(), site, _, outgoing| {
@@ -118,6 +150,16 @@ records! {
     fault "zone-given-twice" ["ZREQ-18"] "It gives a zone to two vehicles at a time."
         because "That a zone is used by one vehicle at a time is not demanded; the catalogue makes it a warning."
         => forbidding(|_, _, what| matches!(what, Permission::Occupied(_)));
+    fault "zone-free-a-minute-after-its-grant" ["ZREQ-18"]
+        "It gives a zone to the next vehicle a minute after it was granted, also while the first one still shows the grant."
+        because "That a zone is used by one vehicle at a time is not demanded; the catalogue makes it a warning."
+        => fleet::<BTreeMap<String, Moment>>().decides(|given, _, _, claim, usual| {
+            if claim.said == Some(Grant::Granted) { given.entry(key(claim)).or_insert(claim.said_at); } else { given.remove(&key(claim)); }
+            usual
+        }).allows(|given, site, _, what, usual| match what {
+            Permission::Occupied(claim) => usual && given.get(&key(claim)).is_none_or(|at| *at + Duration::from_secs(60) > site.now.moment),
+            _ => usual,
+        });
     fault "base-extended-outside-the-corridor" ["CORR-23"] "It extends the base of a vehicle that stands outside its corridor."
         because "The catalogue records what a fleet control does then, and makes this a warning."
         => letting(|_, _, what| matches!(what, Permission::Extend(_)));
@@ -125,6 +167,30 @@ records! {
         => plain().lasts(|(), _, _, what, usual| if matches!(what, Span::Lease) { Duration::ZERO } else { usual });
     tolerance "grants-never-prolonged" ["REQ-11"] "It prolongs no grant."
         => forbidding(|_, _, what| matches!(what, Permission::Prolong));
+    tolerance "rejects-then-grants" ["REQ-04", "REQ-03"] "It rejects the first request of a vehicle for a zone, and answers the next ones as usual."
+        => keep::<BTreeMap<String, String>>().decides(|first, _, _, claim, usual| {
+            let Wish::Zone { set_id, zone_id, .. } = &claim.wish else { return usual };
+            let zone = format!("{set_id} {zone_id}");
+            if claim.said.is_none() { first.entry(zone.clone()).or_insert_with(|| claim.id.clone()); }
+            if first.get(&zone) == Some(&claim.id) { Some(Grant::Rejected) } else { usual }
+        });
+    tolerance "same-grant-up-to-three-times" ["REQ-03", "REQ-04", "MQTT-06"] "It sends a grant up to three times, unchanged, until the state shows it."
+        => keep::<BTreeMap<String, (Value, u32)>>().sends(|given, site, vehicle, outgoing| {
+            let name = vehicle.name();
+            let Some(answers) = outgoing.message.get_mut("responses").and_then(Value::as_array_mut) else { return true };
+            answers.retain_mut(|answer| {
+                let id = answer["requestId"].as_str().unwrap_or_default().to_owned();
+                let shown = site.claims.all.iter().any(|claim| claim.whose == name && claim.id == id && claim.shown == "GRANTED");
+                if shown || answer["grantType"] != "GRANTED" { return true; }
+                let (same, times) = given.entry(id).or_insert_with(|| (answer.clone(), 0));
+                *times += 1;
+                answer.clone_from(same);
+                *times <= 3
+            });
+            let says = !answers.is_empty();
+            if !says && let Some(next) = vehicle.header_ids.get_mut("responses") { *next = next.wrapping_sub(1); }
+            says
+        });
     tolerance "queued-before-granted" ["REQ-03", "REQ-04"] "Every request waits in a queue first, if only for a moment."
         => deciding(|_, vehicle, claim, usual| match (claim.said, usual) {
             (None, Some(Grant::Granted)) => {
@@ -170,4 +236,20 @@ fn deciding(change: Deciding) -> Box<Hooks<Deciding>> {
 /// Whether a request is about a zone.
 fn is_zone(claim: &Claim) -> bool {
     matches!(claim.wish, Wish::Zone { .. })
+}
+
+/// What is remembered of requests when it starts.
+#[derive(Clone, Default)]
+struct Start {
+    /// How often the link broke so far.
+    losses: u32,
+    /// No state has come since it started.
+    fresh: bool,
+    /// What was asked for before.
+    old: BTreeSet<String>,
+}
+
+/// Names a request among those of all vehicles.
+fn key(claim: &Claim) -> String {
+    format!("{} {}", claim.whose, claim.id)
 }

@@ -18,6 +18,19 @@ records! {
         });
     fault "stitching-moved" ["ORD-UPD-06"] "Rounds the position of the stitching node to decimetres, and shifts it."
         => stitching(|node, _| node.part("nodePosition", |place| shift(place, "x", 0.3)));
+    fault "stitching-node-placed-at-the-vehicle" ["ORD-UPD-06", "ORD-MSG-07"]
+        "In each update it gives the stitching node the x, y and theta that the vehicle reports at that moment."
+        => composing(|_, vehicle, worded, m| {
+            let position = vehicle.state.as_ref().and_then(|state| state.agv_position.as_ref());
+            let Some(here) = position.filter(|_| worded.is_update()) else { return };
+            worded.nodes(m, |index, _, node| if index == worded.window.first {
+                node.part("nodePosition", |place| {
+                    place.set("x", here.x);
+                    place.set("y", here.y);
+                    place.change("theta", |theta| *theta = json!(here.theta));
+                });
+            });
+        });
     fault "stitching-action-added" ["ORD-UPD-06", "ORD-UPD-15"] "Adds an action to the stitching node."
         => stitching(|node, id| node.add("actions", json!({ "actionType": "beep", "actionId": id, "blockingType": "NONE" })));
     fault "stitching-node-without-actions" ["ORD-UPD-06"] "The stitching node of an update has no actions, also where it had some before."

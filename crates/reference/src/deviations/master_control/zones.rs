@@ -46,6 +46,31 @@ records! {
         });
     fault "zone-ids-repeated" ["ZSET-19"] "All zones of a set have the same id."
         => zone(|zone| zone.set("zoneId", "zone"));
+    fault "zone-ids-counted-by-type" ["ZSET-19"] "It numbers the zones of a set from 1 for each type, so that two zones of different types have the same zoneId."
+        => fleet::<BTreeMap<String, Vec<(String, String)>>>().sends(|known, _, _, outgoing| {
+            outgoing.message.part("zoneSet", |set| {
+                let (mut counts, mut names) = (BTreeMap::<String, u32>::new(), Vec::new());
+                set.each("zones", |zone| {
+                    let count = counts.entry(zone.text("zoneType").to_owned()).or_default();
+                    *count += 1;
+                    names.push((count.to_string(), zone.text("zoneId").to_owned()));
+                    zone.set("zoneId", count.to_string());
+                });
+                known.insert(set.text("zoneSetId").to_owned(), names);
+            });
+            true
+        }).hears(|known, _, _, heard| {
+            // It reads its own numbers back, as those of zones that are asked for.
+            if let Some(state) = heard.message.as_object_mut().filter(|_| heard.name == "state") {
+                state.each("zoneRequests", |request| {
+                    let names = known.get(request.text("zoneSetId")).map(Vec::as_slice).unwrap_or_default();
+                    let mut same = names.iter().filter(|(number, _)| number == request.text("zoneId"));
+                    let asked = same.clone().find(|(_, name)| name.starts_with("release") || name.starts_with("coordinated"));
+                    if let Some((_, name)) = asked.or_else(|| same.next()) { request.set("zoneId", name.as_str()); }
+                });
+            }
+            true
+        });
     fault "zone-type-unknown" ["ZSET-19"] "It writes types of zones in small letters."
         => zone(|zone| zone.change("zoneType", |kind| *kind = json!(kind.as_str().unwrap_or_default().to_ascii_lowercase())));
     fault "zone-without-id" ["ZSET-19"] "Zones have no id."
@@ -60,6 +85,9 @@ records! {
         => zone(|zone| zone.change("releaseLossBehavior", |behavior| *behavior = json!("HALT")));
     fault "limitation-unknown" ["ZSET-20"] "directedLimitation is NONE."
         => zone(|zone| zone.change("directedLimitation", |limitation| *limitation = json!("NONE")));
+    fault "limitation-as-in-the-schema" ["ZSET-20"]
+        "It names directedLimitation and bidirectedLimitation of zones limitation, as the schema of 3.0.0 does by mistake."
+        => zone(|zone| for key in ["directedLimitation", "bidirectedLimitation"] { zone.rename(key, "limitation") });
     fault "exit-actions-left-out" ["ZSET-20"] "It leaves lists of zone actions out that are empty."
         => zone(|zone| ["duringActions", "exitActions"].into_iter().for_each(|key| if zone.list(key).is_empty() { zone.unset(key) }));
     fault "members-of-all-types" ["ZSET-20"] "Every zone has a maximumSpeed, whatever its type."
@@ -99,6 +127,12 @@ records! {
     fault "unreachable-node-ignored" ["ZERR-03"] "It does nothing when a vehicle says that it cannot come to a node."
         because "What a master control does about it may not be visible; that nothing is seen is a warning."
         => forbidding(|_, _, what| matches!(what, Permission::GiveUp));
+    tolerance "alarm-only-when-a-vehicle-is-stuck" ["ZERR-03", "CORR-23"]
+        "After NODE_UNREACHABLE or OUTSIDE_OF_CORRIDOR it shows an alarm and sends nothing for the order until somebody decides."
+        => allowing(|vehicle, what, usual| {
+            let stuck = vehicle.state.as_ref().is_some_and(|state| state.has_error("NODE_UNREACHABLE") || state.has_error("OUTSIDE_OF_CORRIDOR"));
+            usual && !(stuck && matches!(what, Permission::GiveUp | Permission::Extend(_)))
+        });
     tolerance "zones-described" ["ZSET-04"] "It describes its sets and zones."
         => zone_set(|m| m.part("zoneSet", |set| {
             set.set("zoneSetDescriptor", "allée");
