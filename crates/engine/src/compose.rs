@@ -96,6 +96,10 @@ impl Composer {
             .get(&send.topic)
             .cloned()
             .ok_or_else(|| ComposeError::Topic(send.topic.clone()))?;
+        let topic = match send.neighbour {
+            true => of_neighbour(&topic, &ground.identity.1),
+            false => topic,
+        };
         let times = times_to_come(send, ground.pack.timestamp_digits(), now);
         let mut timed = Bindings::new();
         let bindings = if times.is_empty() {
@@ -171,6 +175,9 @@ impl Composer {
         actions: &mut Vec<(String, String)>,
     ) -> Result<Value, ComposeError> {
         let mut message = self.header(&send.topic, ground, now);
+        if send.neighbour {
+            message.insert("serialNumber".to_owned(), json!(neighbour(&ground.identity.1)));
+        }
         let payload = send.payload.as_ref().map(|term| term.bind(bindings)).transpose()?;
         if !send.actions.is_empty() {
             let kind = ActionKind::Instant {
@@ -324,6 +331,20 @@ impl Composer {
             _ => Map::new(),
         }
     }
+}
+
+/// The serial number of a vehicle that does not exist, beside the one under test.
+fn neighbour(serial_number: &str) -> String {
+    format!("{serial_number}-neighbour")
+}
+
+/// The topic of the vehicle that does not exist in the place of that of the one under test.
+fn of_neighbour(topic: &str, serial_number: &str) -> String {
+    let mut levels: Vec<String> = topic.split('/').map(str::to_owned).collect();
+    if let Some(level) = levels.iter_mut().rev().find(|level| *level == serial_number) {
+        *level = neighbour(serial_number);
+    }
+    levels.join("/")
 }
 
 /// Where actions stand.

@@ -8,6 +8,9 @@ use tck_view::{FactsheetView, Member, Number, PhysicalParameters};
 /// limit, and no crawling.
 const SHARE: f64 = 1.0 / 3.0;
 
+/// The share of the slow speed that is asked for where the vehicle comes from an edge with the slow one.
+const SLOWER: f64 = 0.6;
+
 /// What is asked for of a vehicle that does not say how fast it is, in metres or radians per second.
 const UNSAID: f64 = 0.5;
 
@@ -69,7 +72,7 @@ impl Pace {
         share(least, most)
     }
 
-    /// Adds `slowSpeed` and `slowRotation` to every edge of the course.
+    /// Adds `slowSpeed`, `slowerSpeed` and `slowRotation` to every edge of the course.
     pub(super) fn set(self, course: &mut Value) {
         let edges = course.get_mut(EDGES).and_then(Value::as_object_mut);
         for members in edges
@@ -78,7 +81,10 @@ impl Pace {
             .filter_map(Value::as_object_mut)
         {
             let cap = members.get(MAX_SPEED).and_then(Value::as_f64);
-            members.insert("slowSpeed".to_owned(), self.speed(cap).into());
+            let slow = self.speed(cap);
+            let slower = (slow * SLOWER).max(self.speed.0.unwrap_or(0.0)).min(slow);
+            members.insert("slowSpeed".to_owned(), slow.into());
+            members.insert("slowerSpeed".to_owned(), slower.into());
             members.insert("slowRotation".to_owned(), share(self.turning.0, self.turning.1).into());
         }
     }
@@ -117,6 +123,7 @@ mod tests {
         let course = course(Some(&sheet), json!({ "length": 2.0 }));
         assert!((slow(&course) - 0.5).abs() < 1e-9);
         assert!((course["edges"]["a-b"]["slowRotation"].as_f64().expect("a speed") - 0.3).abs() < 1e-9);
+        assert!((course["edges"]["a-b"]["slowerSpeed"].as_f64().expect("a speed") - 0.3).abs() < 1e-9);
         assert_eq!(between_looks(&course), Some(500));
     }
 

@@ -15,6 +15,7 @@ use tck_judge::RunJudge;
 use tck_net::link::Link;
 use tck_pack::HookEffect;
 use tck_suite::model::Test;
+use tck_world::rest::has_order;
 
 /// Whether no state has named the last order that was sent since then, although states came.
 fn last_order_never_showed(judge: &RunJudge, since: Moment) -> bool {
@@ -236,6 +237,7 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
             all.iter().any(busy)
         };
         self.cancelled = None;
+        self.give_up_retries().await?;
         if is_busy(&self.obstacles()) && self.engine.cancels {
             self.rung("cancelOrder")?;
             let since = self.engine.link.now().moment;
@@ -271,6 +273,28 @@ impl<L: Link, O: Operator> Session<'_, L, O> {
         }
         if self.obstacles().contains(&Obstacle::Load) && self.have_done(HookEffect::RemovesLoads, Value::Null).await? {
             self.rests_within(self.time("settle")).await?;
+        }
+        Ok(())
+    }
+
+    /// Of a vehicle without an order, lets what waits for a retry fail: nothing else ends an instant action that does.
+    async fn give_up_retries(&mut self) -> Result<(), EngineError> {
+        let Some(state) = self.engine.recorder.judge().state().filter(|state| !has_order(state)) else {
+            return Ok(());
+        };
+        let waiting = state
+            .all_action_states()
+            .filter(|action| action.action_status.is("RETRIABLE"));
+        let waiting: Vec<String> = waiting
+            .filter_map(|action| Some(action.action_id.text()?.to_owned()))
+            .collect();
+        for id in &waiting {
+            self.rung("skipRetry")?;
+            let named = json!([{ "key": "actionId", "value": id }]);
+            self.instant_action("skipRetry", named).await?;
+        }
+        if !waiting.is_empty() {
+            self.rests_within(self.time("react")).await?;
         }
         Ok(())
     }

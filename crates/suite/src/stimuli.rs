@@ -13,7 +13,19 @@ use tck_base::yaml::{Kind, Node};
 use tck_journal::event::{Direction, LinkFault};
 
 pub(super) const SEND_KEYS: &[&str] = &[
-    "route", "payload", "action", "as", "with", "withAll", "blocking", "actions", "patch", "raw", "qos", "retain",
+    "route",
+    "payload",
+    "action",
+    "as",
+    "with",
+    "withAll",
+    "blocking",
+    "actions",
+    "patch",
+    "raw",
+    "qos",
+    "retain",
+    "neighbour",
 ];
 pub(super) const SERVE_KEYS: &[&str] = &["file", "json", "behaviour"];
 pub(super) const OPERATOR_KEYS: &[&str] = &["with", "within", "each"];
@@ -140,6 +152,7 @@ pub(super) fn send(topic: &str, fields: &Fields<'_>, at: &Span, problems: &mut P
             .whole_number("qos", 2, problems)
             .and_then(|qos| u8::try_from(qos).ok()),
         retain: fields.flag("retain", problems),
+        neighbour: fields.flag("neighbour", problems),
     }
 }
 

@@ -5,7 +5,7 @@
 use super::Agv;
 use super::action_effect::{Outcome, Problem};
 use super::actions::{Action, Status};
-use super::hook_points::Permission;
+use super::hook_points::{Event, Permission};
 
 /// The one service that the vehicle has a certificate for.
 const SERVICE: &str = "MQTT";
@@ -16,6 +16,14 @@ const LINKS: [&str; 3] = [
     "certificateDownloadLink",
     "certificateAuthorityDownloadLink",
 ];
+
+/// How a key or a certificate begins, in the form in which they are mostly stored.
+const PEM: &[u8] = b"-----BEGIN ";
+
+/// Whether a file looks like a key or a certificate.
+fn is_pem(file: &[u8]) -> bool {
+    file.windows(PEM.len()).any(|part| part == PEM)
+}
 
 /// The links of an updateCertificate action.
 fn links(action: &Action) -> Vec<String> {
@@ -59,7 +67,8 @@ impl Agv {
     }
 
     /// A file of an updateCertificate action is there.
-    pub(crate) fn certificate_file_done(&mut self, action: &Action) {
+    pub(crate) fn certificate_file_done(&mut self, action: &Action, file: &[u8]) {
+        self.happens(Event::CertificateFile(is_pem(file)));
         let outcome = self.fetch_next(action, action.files);
         let outcome = self.ends(action, outcome);
         self.conclude(&action.request.id, outcome);

@@ -57,6 +57,8 @@ pub(crate) struct Heeding {
     passages: u32,
     /// Counts actions of zones.
     pub(crate) actions: u32,
+    /// The zone whose actions were listed last, and which of its lists that was.
+    pub(crate) acting: Option<(String, Passage)>,
 }
 
 impl Heeding {
@@ -309,6 +311,7 @@ impl Agv {
             return;
         }
         self.heeding.passages = self.heeding.passages.wrapping_add(1);
+        self.heeding.acting = Some((zone.id.clone(), passage));
         let origin = Origin::Zone(self.heeding.passages);
         for request in requests {
             self.heeding.actions = self.heeding.actions.wrapping_add(1);

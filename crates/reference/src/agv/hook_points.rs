@@ -62,6 +62,8 @@ pub(crate) enum Permission<'a> {
     SayOnline,
     /// The factsheet is published on a new connection (FACT-01).
     SayFactsheet,
+    /// It takes a message of a topic name that is meant for another vehicle; the full topic.
+    HearAnother(&'a str, &'a str),
     /// DISCONNECT is sent after OFFLINE (CONN-08).
     Disconnect,
     /// A map is downloaded that is on board already (MAP-23).
@@ -166,6 +168,8 @@ pub(crate) enum Permission<'a> {
     KeepZoneRequest(&'a ZoneRequest),
     /// It heeds that the release of a zone is revoked or has expired (ZREQ-11, ZREQ-12, ZREQ-13).
     HeedZoneLoss(&'a ZoneRequest, RequestStatus),
+    /// It says EXPIRED before it takes a request back whose lease has run out before it went in (ZREQ-12).
+    ShowExpired,
     /// It stops in a zone whose release is lost (ZONE-11).
     StayWithoutRelease(ReleaseLoss),
     /// It stops where a zone does not say what follows when its release is lost (ZONE-13).
@@ -355,6 +359,8 @@ pub(crate) enum Event {
     DownloadRunning,
     /// A file is there; the map is stored next.
     Downloaded,
+    /// A file of an updateCertificate action is there, and whether it looks like a key or a certificate.
+    CertificateFile(bool),
     /// A zone set was taken over.
     ZoneSetStored,
     /// instantActions were read.

@@ -372,7 +372,9 @@ impl Agv {
 
     fn message(&mut self, topic: &str, payload: &[u8]) {
         for name in HEARD {
-            if self.config.topic(name) != Some(topic) || !self.hears(name, payload) {
+            let own = self.config.topic(name) == Some(topic);
+            let meant = own || self.allows(hooks::Permission::HearAnother(name, topic), false);
+            if !meant || !self.hears(name, payload) {
                 continue;
             }
             let Some(heard) = self.heard_asleep(name, payload) else {

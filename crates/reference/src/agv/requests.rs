@@ -290,7 +290,7 @@ impl Agv {
         let way = request.way.clone();
         let sequence_id = request.sequence_id;
         let Some(way) = way else {
-            if status == RequestStatus::Expired {
+            if status == RequestStatus::Expired && self.allows(Permission::ShowExpired, true) {
                 self.flush();
             }
             self.withdraw(id);

@@ -153,7 +153,7 @@ impl Agv {
             if self.motion.is_moving() {
                 self.motion.halt(moment);
             }
-            if status == RequestStatus::Expired {
+            if status == RequestStatus::Expired && self.allows(Permission::ShowExpired, true) {
                 self.flush();
             }
             self.withdraw_zone(id);

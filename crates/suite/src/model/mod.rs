@@ -312,6 +312,8 @@ pub struct Send {
     pub qos: Option<u8>,
     /// Set RETAIN.
     pub retain: bool,
+    /// On the topic of another vehicle, which there is not.
+    pub neighbour: bool,
 }
 
 /// What `raw:` publishes.

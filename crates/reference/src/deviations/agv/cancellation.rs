@@ -134,6 +134,28 @@ records! {
         => plain()
             .happens(|(), agv, event| if event == Event::CancelBegun { agv.flush() })
             .allows(|(), _, what, usual| usual && !matches!(what, Permission::CancelAwaits(_)));
+    fault "uncancellable-action-failed-at-once" ["ORD-CANCEL-05", "ORD-CANCEL-06"] "It reports an action that cannot be broken off FAILED, and cancelOrder FINISHED, as soon as its order is cancelled, and works on until the action has ended."
+        => keep::<Vec<String>>()
+            .happens(|going, agv, event| match event {
+                Event::CancelBegun => {
+                    let active = agv.actions.iter().filter(|action| action.of_order() && action.status.is_active());
+                    *going = active.map(Action::id).collect();
+                }
+                Event::PowerCycled => going.clear(),
+                _ => {}
+            })
+            .allows(|going, _, what, usual| match what {
+                Permission::CancelAwaits(action) | Permission::Count(action) => usual && !going.contains(&action.request.id),
+                Permission::Forget(action) => usual && !(going.contains(&action.request.id) && action.status.is_active()),
+                _ => usual,
+            })
+            .says(|going, agv, part, m| match part {
+                Part::Action(action) if going.contains(&action.request.id) => {
+                    m.set("actionStatus", "FAILED");
+                    agv.order.cancelled || agv.order.cancel.is_some()
+                }
+                _ => true,
+            });
     fault "cancel-not-running" ["ORD-CANCEL-06", "ASTATE-05", "ORD-CANCEL-29"] "It reports cancelOrder WAITING instead of RUNNING as long as an action is still running."
         => when(Event::CancelBegun, |agv| if let Some(cancel) = &agv.order.cancel && let Some(action) = agv.actions.get_mut(&cancel.action_id) {
             action.status = Status::Waiting;

@@ -19,6 +19,11 @@ records! {
         => joining(|agv, options| if agv.connection.was_online() { unsubscribe(agv, options, "order") });
     fault "not-subscribed-again" ["TOPIC-10", "MQTT-10"] "Does not subscribe again when it reconnects."
         => joining(|agv, options| if agv.connection.was_online() { options.subscriptions.clear() });
+    fault "zone-topics-not-subscribed-again" ["TOPIC-16", "REQ-06", "ZSET-01", "MQTT-10"] "After a reconnect it subscribes to orders and instant actions only, and neither zone sets nor responses reach it any more."
+        => joining(|agv, options| if agv.connection.was_online() {
+            unsubscribe(agv, options, "zoneSet");
+            unsubscribe(agv, options, "responses");
+        });
     fault "no-will" ["CONN-01", "CONN-02", "CONN-03"] "Connects without a last will."
         => joining(|_, options| options.will = None);
     fault "will-forgotten-on-reconnect" ["CONN-01", "CONN-02"] "It registers a last will at its first connection only, and connects again without one."

@@ -10,6 +10,9 @@ use tck_base::nurbs::Path;
 
 use super::prelude::*;
 
+/// So long it waits for a release.
+const PATIENCE: Duration = Duration::from_secs(15);
+
 records! {
     fault "stops-on-link-loss" ["MQTT-04"] "Stands still as long as the link is down."
         => forbidding(|agv, what| matches!(what, Permission::Drive) && !agv.connection.online);
@@ -34,6 +37,21 @@ records! {
         => slipping(|speed| speed * 4.0);
     fault "horizon-crept-into" ["ORD-UPD-01", "ORD-07"] "Waits at the decision point for a moment and creeps on into the horizon."
         => slipping(|speed| speed / 40.0);
+    fault "horizon-entered-after-waiting" ["ORD-UPD-01", "ORD-07"] "It waits at the decision point for fifteen seconds, and then drives to the first node of the horizon without a release."
+        => keep::<Option<Moment>>()
+            .happens(|since, agv, event| match event {
+                Event::NodeReached(_) | Event::Begun => *since = None,
+                Event::Settled | Event::Woken => {
+                    let waits = agv.waits_at_decision_point() && agv.order.cancel.is_none();
+                    *since = waits.then(|| since.unwrap_or(agv.moment()));
+                }
+                _ => {}
+            })
+            .allows(|since, agv, what, usual| {
+                let waited = since.is_some_and(|since| agv.moment().since(since) >= PATIENCE);
+                usual || waited && matches!(what, Permission::Enter)
+            })
+            .due(|since, agv| since.map(|since| since + PATIENCE).filter(|end| *end > agv.moment()));
     fault "warning-blocks" ["ERR-03", "ORD-06", "ORD-FLOW-12"] "Does not drive while it reports a warning."
         => forbidding(|agv, what| matches!(what, Permission::Drive) && !agv.errors.is_empty());
     fault "node-skipped" ["ORD-01", "STATE-06", "NODE-03"] "Leaves plain nodes between others out of its reports."
@@ -96,6 +114,20 @@ records! {
         => planning(|_, leg| leg.permitted = leg.permitted.filter(|_| !leg.backwards));
     fault "max-speed-of-edge-before" ["ORD-MSG-20", "OPT-01"] "It keeps to the maxSpeed of the edge before the one it drives on."
         => planning(|agv, leg| leg.permitted = agv.order.left.1.as_ref().and_then(|left| left.max_speed));
+    fault "brakes-only-on-the-slow-edge" ["ORD-MSG-20"] "It brakes for a slower edge when it is on it, and drives its first metre as fast as the edge before."
+        => keep::<Option<(Moment, f64)>>()
+            .happens(|rolls, agv, event| if matches!(event, Event::EdgeLeft(_)) {
+                let permitted = agv.order.left.1.as_ref().and_then(|edge| edge.max_speed);
+                let speed = permitted.map_or(agv.config.speed, |permitted| permitted.min(agv.config.speed));
+                *rolls = Some((agv.moment(), speed));
+            })
+            .plans(|rolls, agv, leg| if let Some((_, speed)) = rolls.filter(|(at, _)| *at == agv.moment())
+                && leg.is_whole()
+                && leg.permitted.is_some_and(|permitted| permitted < speed)
+            {
+                leg.permitted = Some(speed);
+                (leg.way, leg.to_node) = (leg.distance.min(2.0) / 2.0, false);
+            });
     fault "max-speed-forgotten-in-pause" ["ORD-MSG-20"] "After a pause on an edge it drives the rest of that edge at its own speed, whatever maxSpeed says."
         => keep::<bool>()
             .does(|hurried, agv, action| {

@@ -40,6 +40,13 @@ records! {
             let order = t.get("minOrderInterval").and_then(Value::as_f64).unwrap_or_default();
             t.set("minOrderInterval", order * 1000.0);
         }));
+    fault "states-closer-than-stated" ["FACT-14", "STATE-11"] "It states a minimum interval of half a second, and sends a state for each change, several at once on a node."
+        because "FACT-14 contradicts the sending on events, so that its ruling leaves a warning."
+        => factsheet(|_, m| timing(m, |t| t.set("minStateInterval", 0.5))).happens(|_, agv, event| {
+            if matches!(event, Event::NodeNoted(_) | Event::NodePassed(_) | Event::EdgeEntered(_)) {
+                agv.flush();
+            }
+        });
     fault "own-limit-exceeded" ["FACT-11"] "States room for one action in its states and sends more."
         => factsheet(|_, m| one_action_state(m));
     fault "array-limits-nested" ["FACT-05", "JSON-10"] "Its factsheet gives the array limits of orders as nested objects and not under names with a dot."

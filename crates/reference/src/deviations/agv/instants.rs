@@ -129,6 +129,26 @@ records! {
             let hard = |action: &Action| matches!(action.origin, Origin::Node(_)) && action.request.blocking == Blocking::Hard;
             agv.actions.iter().any(|action| hard(action) && action.status.is_active())
         });
+    fault "instant-actions-read-on-nodes" ["IACT-05", "STATE-09"] "It reads instant actions that come while it drives only when it is on its next node, and does not list them before."
+        => keep::<Vec<Vec<u8>>>()
+            .hears(|unread, agv, name, payload| {
+                let waits = name == "instantActions" && agv.order.entered && agv.motion.is_moving();
+                if waits {
+                    unread.push(payload.to_vec());
+                }
+                !waits
+            })
+            .happens(|unread, agv, event| {
+                let off_the_edge = event == Event::Settled && !agv.order.entered;
+                if (matches!(event, Event::NodePassed(_)) || off_the_edge) && !unread.is_empty() {
+                    for payload in std::mem::take(unread) {
+                        agv.instant_actions_received(&payload);
+                    }
+                    if off_the_edge {
+                        agv.settle();
+                    }
+                }
+            });
     fault "undescribed-status" ["ACT-41"] "Reports instant actions INITIALIZING that have no preparation." because "It breaks a recommendation only."
         => plain().happens(|(), agv, event| if event == Event::InstantBegun {
             let begun = agv.actions.iter_mut().filter(|action| !action.of_order() && action.status == Status::Waiting);

@@ -1,6 +1,7 @@
 //! Deviations of going to sleep, waking up and leaving, and of the triggers that actions wait for (section 6.2.3.1 of 3.0).
 
 use super::prelude::*;
+use crate::Output;
 use crate::agv::report::Telling;
 
 records! {
@@ -20,6 +21,11 @@ records! {
             agv.shut_down();
             let back = agv.moment() + Duration::from_secs(1);
             agv.connection.wanted_at(back);
+        });
+    fault "hibernation-breaks-the-link" ["HIB-03", "HIB-11"] "It closes its connection without a DISCONNECT when it goes to hibernation, and hears nothing any more."
+        => when(Event::FallenAsleep, |agv| {
+            agv.pending.push(Output::Drop);
+            agv.connection.stays_away();
         });
     fault "hibernates-with-its-order" ["HIB-04", "ORD-CLEAR-02", "HIB-05"] "It keeps its order in hibernation."
         => forbidding(|_, what| matches!(what, Permission::ClearForSleep));
@@ -75,6 +81,18 @@ records! {
         => failed(Effect::Shutdown, |agv, _| agv.give_up_order());
     fault "shutdown-is-a-word" ["SHUT-02"] "It reports shutdown FINISHED and stays where it is."
         => instead(Effect::Shutdown, |_, _| Some(Outcome::Done(None)));
+    fault "shutdown-breaks-the-link" ["SHUT-02", "CONN-07", "CONN-08"] "On shutdown it closes its connection without OFFLINE and without a DISCONNECT, so that its last will is published."
+        => keep::<bool>()
+            .ends(|leaves, _, action, outcome| {
+                *leaves |= is(action, Effect::Shutdown) && matches!(outcome, Outcome::Done(_));
+                outcome
+            })
+            .happens(|leaves, _, event| *leaves &= event != Event::Connected)
+            .allows(|leaves, _, what, usual| usual && !(*leaves && match what {
+                Permission::Disconnect => true,
+                Permission::Say("connection", body) => body.says("connectionState", "OFFLINE"),
+                _ => false,
+            }));
     fault "shuts-down-without-a-word" ["SHUT-02"] "It shuts down before a state says that shutdown is FINISHED." because "By the ruling of SHUT-02 a missing last state is a warning."
         => action(|_, action, m| {
             if is(action, Effect::Shutdown) && action.status == Status::Finished {
@@ -135,6 +153,78 @@ records! {
         => letting(|_, what| matches!(what, Permission::HeedTrigger(action) if action.status == Status::Running));
     fault "certificate-fetched-in-clear" ["CERT-03"] "It fetches key and certificate over plain HTTP, and takes them over."
         => forbidding(|_, what| matches!(what, Permission::RefusePlainLink));
+    fault "broken-certificate-activated" ["CERT-02", "CERT-01"] "It takes a file over that is no key or certificate, reports updateCertificate FINISHED, and does not come back when its link breaks."
+        => keep::<bool>().happens(|broken, agv, event| match event {
+            Event::CertificateFile(usable) => *broken |= !usable,
+            Event::ConnectionLost if *broken => agv.connection.shut_down = true,
+            _ => {}
+        });
+    tolerance "failed-download-waits-for-a-retry" ["MAP-19", "ZSET-18", "RETRY-02"] "A download that has failed is RETRIABLE until retry or skipRetry comes."
+        => keep::<Vec<String>>()
+            .ends(|failed, agv, action, outcome| {
+                let fetches = is(action, Effect::DownloadMap) || is(action, Effect::DownloadZoneSet);
+                let begun = action.status != Status::Waiting && agv.config.has("retry");
+                if fetches && begun && matches!(outcome, Outcome::Failed(_)) {
+                    failed.push(action.id());
+                }
+                outcome
+            })
+            .raises(|failed, agv, cause, _| {
+                if let Cause::Failure(Some(action)) = cause && failed.contains(&action.request.id) {
+                    agv.waits_for_retry(&action.request.id);
+                }
+                true
+            })
+            .does(|failed, agv, action| {
+                let named = action.text("actionId").to_owned();
+                let waits = agv.actions.get(&named).is_some_and(|named| named.status == Status::Retriable);
+                let again = is(action, Effect::Retry) && waits && failed.contains(&named);
+                again.then(|| {
+                    failed.retain(|id| *id != named);
+                    agv.complete(&named);
+                    Outcome::Done(None)
+                })
+            });
+    tolerance "sleeps-as-another-client" ["HIB-11", "HIB-03", "CONN-11"] "In hibernation another client of the vehicle holds the connection, and says HIBERNATING again whenever it connects."
+        => keep::<(bool, Option<Moment>)>()
+            .connects(|(asleep, _), _, options| if *asleep {
+                options.client_id.push_str(".asleep");
+            })
+            .happens(|(asleep, wakes_at), agv, event| match event {
+                Event::FallenAsleep if !*asleep => {
+                    (*asleep, *wakes_at) = (true, agv.sleep.wakes_at);
+                    agv.pending.push(Output::Disconnect);
+                    let next = agv.moment() + Duration::from_millis(100);
+                    agv.connection.dropped(next);
+                }
+                Event::Connected if *asleep => {
+                    (agv.sleep.asleep, agv.sleep.wakes_at) = (true, *wakes_at);
+                    agv.publish_connection("HIBERNATING");
+                }
+                Event::Awoken | Event::PowerCycled => *asleep = false,
+                _ => {}
+            })
+            .allows(|(asleep, _), _, what, usual| {
+                usual && !(*asleep && matches!(what, Permission::SayOnline | Permission::SayFactsheet))
+            });
+    tolerance "wakes-for-its-battery" ["HIB-08"] "It wakes after five seconds of hibernation because its battery runs low, and says so in an error."
+        => keep::<Option<Moment>>()
+            .happens(|low, agv, event| match event {
+                Event::FallenAsleep => *low = Some(agv.moment() + Duration::from_secs(5)),
+                Event::Awoken | Event::Connected | Event::PowerCycled => *low = None,
+                Event::Woken if low.take_if(|low| *low <= agv.moment()).is_some() && agv.sleep.asleep => {
+                    agv.errors.raise(ActiveError {
+                        error_type: "batteryLow".to_owned(),
+                        fatal: false,
+                        references: Vec::new(),
+                        description: "the battery has to be charged".to_owned(),
+                        life: Life::Until(agv.moment() + Duration::from_secs(30)),
+                    });
+                    agv.wakes_up();
+                }
+                _ => {}
+            })
+            .due(|low, _| *low);
     tolerance "never-waits-for-a-retry" ["RETRY-01"] "A retriable action that fails is FAILED at once."
         => failure(|agv, action, _| {
             if action.status == Status::Retriable {

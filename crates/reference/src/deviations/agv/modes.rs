@@ -14,6 +14,22 @@ records! {
             Event::ModeChanged(_) if agv.order.last_node.is_empty() => agv.order.last_node.clone_from(kept),
             _ => {}
         });
+    fault "order-in-startup-stored" ["ORD-REJ-23", "MODE-18"] "It says nothing about an order that comes in STARTUP, and begins it as soon as it is ready."
+        => keep::<Option<Vec<u8>>>()
+            .hears(|stored, agv, name, payload| {
+                let early = name == "order" && agv.mode == Mode::Startup;
+                if early {
+                    *stored = Some(payload.to_vec());
+                }
+                !early
+            })
+            .happens(|stored, agv, event| if matches!(event, Event::ModeChanged(_)) && agv.mode.takes_orders() && let Some(payload) = stored.take() {
+                agv.order_received(&payload);
+            });
+    fault "route-cleared-before-the-mode" ["ORD-CLEAR-10"] "It empties nodeStates and edgeStates when somebody switches it to MANUAL, and says MANUAL only when the last action of its order has ended."
+        => when(Event::Settled, |agv| if agv.awaited_mode.is_some() {
+            agv.order.drop_route();
+        });
     fault "intervention-ends-order" ["MODE-07"] "It gives its order up when somebody steps in."
         => when(Event::ModeChanging(Mode::Intervened), Agv::give_up_order);
     fault "intervention-refuses-orders" ["MODE-10"] "It takes no orders and no updates while somebody steps in."
@@ -180,6 +196,22 @@ records! {
                 agv.errors.forget_refusals();
             }
         });
+    tolerance "update-of-a-cleared-order-taken" ["ORD-CLEAR-12"] "It takes over an update of an order that was cleared because of its mode, and drives it."
+        => keep::<bool>()
+            .happens(|cleared, _, event| match event {
+                Event::GivenUpForMode(_) => *cleared = true,
+                Event::Begun | Event::Updated | Event::CancelBegun | Event::PowerCycled => *cleared = false,
+                _ => {}
+            })
+            .allows(|cleared, agv, what, usual| usual || *cleared && match what {
+                Permission::Overlook(Objection::Cancelled) => true,
+                Permission::Overlook(Objection::Joint(first)) => agv.is_within(first, 0.0, true),
+                _ => false,
+            })
+            .adopts(|cleared, agv, adoption| {
+                agv.order.cancelled &= !(*cleared && adoption.update);
+                true
+            });
     tolerance "order-id-survives-power-cycle" ["STATE-MSG-02"] "After it was switched off and on it still reports the orderId and orderUpdateId of its last order."
         => keep::<(String, u32)>().happens(|(id, update_id), agv, event| match event {
             Event::PowerCycled => {

@@ -72,6 +72,15 @@ records! {
             }
             true
         });
+    fault "next-metres-renewed-every-five-seconds" ["PATH-08", "PATH-02"] "While it drives it plans its next metres every five seconds only, and shares the same ones in between."
+        => keep::<Option<(Moment, Value)>>().sends(|kept, agv, out| {
+            let (now, moves) = (agv.moment(), agv.motion.is_moving());
+            kept.take_if(|(at, _)| !moves || now.since(*at) >= Duration::from_secs(5));
+            if let Some(path) = out.message.get_mut("intermediatePath").filter(|_| moves) {
+                path.clone_from(&kept.get_or_insert_with(|| (now, path.clone())).1);
+            }
+            true
+        });
     fault "line-shown-as-its-own-path" ["PATH-09"] "A vehicle on virtual lines shares its way as a path that it has planned itself." because "By the ruling of PATH-09 it is a warning."
         => letting(|_, what| matches!(what, Permission::ReportPath));
     fault "trajectory-of-its-own-on-an-edge" ["STATE-MSG-21"] "It shows a trajectory in its edge states that nobody has sent."
@@ -101,6 +110,33 @@ records! {
         });
     fault "drives-blind" ["STATE-MSG-19"] "It drives on although it cannot tell where it is."
         => drives(Hindrance::Lost, |_| true);
+    tolerance "planned-path-into-the-horizon" ["PATH-01", "PATH-04"] "The path that it has planned leads beyond its base into the horizon."
+        => plain().says(|(), agv, part, m| {
+            if matches!(part, Part::State | Part::Visualization) {
+                m.part("plannedPath", |path| into_horizon(agv, path));
+            }
+            true
+        });
     fault "localized-by-force" ["STATE-MSG-19"] "It goes on saying that it is localized while it reports that it is not."
         => position(|_, m| m.set("positionInitialized", true));
+}
+
+/// Makes a path longer by the nodes of the horizon.
+fn into_horizon(agv: &Agv, path: &mut Object) {
+    for stop in agv.order.nodes.iter().filter(|stop| !stop.node.released) {
+        path.add("traversedNodes", json!(stop.node.id));
+        path.part("trajectory", |trajectory| {
+            trajectory.add(
+                "controlPoints",
+                json!({ "x": stop.place.x, "y": stop.place.y, "weight": 1.0 }),
+            );
+            let last = u32::try_from(trajectory.list("controlPoints").len())
+                .unwrap_or(2)
+                .max(2)
+                - 1;
+            let inner = (0..=last).map(|at| f64::from(at) / f64::from(last));
+            let knots: Vec<f64> = std::iter::once(0.0).chain(inner).chain([1.0]).collect();
+            trajectory.set("knotVector", knots);
+        });
+    }
 }

@@ -43,6 +43,26 @@ records! {
         });
     fault "pause-drives-on" ["ACT-12", "ACT-15"] "Drives to the next node before it pauses."
         => drives(Hindrance::Hold, |agv| agv.order.entered && agv.holds.pause);
+    fault "pauses-at-the-next-node" ["ACT-12", "ACT-15"] "It drives on to its next node before it pauses, and reports startPause RUNNING until then."
+        => keep::<Vec<String>>()
+            .does(|waiting, agv, action| {
+                let drives = agv.order.entered && agv.motion.is_moving() && !agv.pause_blocked;
+                (is(action, Effect::StartPause) && drives).then(|| {
+                    waiting.push(action.id());
+                    if let Some(action) = agv.actions.get_mut(&action.request.id) {
+                        action.status = Status::Running;
+                    }
+                    Outcome::Open
+                })
+            })
+            .happens(|waiting, agv, event| {
+                let off_the_edge = event == Event::Settled && !agv.order.entered;
+                if matches!(event, Event::NodePassed(_)) || off_the_edge {
+                    for id in std::mem::take(waiting) {
+                        agv.complete(&id);
+                    }
+                }
+            });
     fault "pause-drops-order" ["ACT-14"] "Gives the order up when it is paused."
         => instead(Effect::StartPause, |agv, _| {
             if !agv.pause_blocked {
@@ -159,6 +179,20 @@ records! {
         => when(Event::Held, |agv| {
             let held = agv.actions.iter_mut().filter(|action| action.status == Status::Paused);
             held.for_each(|action| action.status = Status::Waiting);
+        });
+    fault "paused-preparation-waits-again" ["ASTATE-05", "ASTATE-02"] "It sets an action that it prepares back to WAITING on startPause, and begins it anew after the pause."
+        => when(Event::Held, |agv| {
+            let prepares = |action: &&Action| {
+                let held = action.held.as_ref().map(|(status, _)| *status);
+                action.of_order() && held.unwrap_or(action.status) == Status::Initializing
+            };
+            let prepared: Vec<(String, Origin)> = agv.actions.iter().filter(prepares).map(|action| (action.id(), action.origin)).collect();
+            for (id, origin) in prepared {
+                if let Some(action) = agv.actions.get_mut(&id) {
+                    action.end(Status::Waiting);
+                }
+                agv.actions.queue(origin, [vec![id]].into());
+            }
         });
     fault "resumed-action-waits-again" ["ASTATE-05", "ACT-18"] "It sends an action that was PAUSED back to WAITING on stopPause and starts it anew."
         => keep::<(Vec<Origin>, Option<Moment>)>()

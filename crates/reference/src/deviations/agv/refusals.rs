@@ -84,6 +84,18 @@ records! {
             let of_order = |error: &ActiveError| error.references.iter().any(|(key, value)| key == "topic" && value == "order");
             said(true, || agv.errors.active.retain(|error| !of_order(error)))
         });
+    fault "refusal-shown-once" ["ORD-REJ-21", "ORD-REJ-26", "ERR-09", "ERR-01"] "It lists the error of a refused order in one state, and no more in the next one."
+        => keep::<Vec<ActiveError>>()
+            .raises(|shown, _, cause, error| {
+                if matches!(cause, Cause::Refusal(..)) {
+                    shown.push(error.clone());
+                }
+                true
+            })
+            .happens(|shown, agv, event| if event == Event::StateSent {
+                let shown = std::mem::take(shown);
+                agv.errors.active.retain(|error| !shown.contains(error));
+            });
     fault "refusal-level-corrected" ["ORD-REJ-12", "ORD-REJ-02", "ORD-REJ-06", "ORD-CANCEL-19"] "Reports a refusal as FATAL at first, and right a moment later."
         => corrected(|wrong| wrong.fatal = !wrong.fatal);
     fault "refusal-type-corrected" ["ORD-REJ-06", "ORD-REJ-02", "ORD-REJ-12"] "Reports a refusal as internalError at first, and right a moment later."

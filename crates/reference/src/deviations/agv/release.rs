@@ -221,6 +221,8 @@ records! {
         });
     tolerance "release-without-behaviour-refused" ["ZONE-13"] "It refuses a zone set with a RELEASE zone that does not say what follows when its release is lost."
         => forbidding(|_, what| matches!(what, Permission::TakeReleaseUnsaid));
+    tolerance "release-expiry-unshown" ["ZREQ-12", "REQ-12"] "It removes a request whose lease ends before it went in without saying EXPIRED, and asks anew."
+        => forbidding(|_, what| matches!(what, Permission::ShowExpired));
     tolerance "release-revoked-shown" ["ZREQ-11"] "It says REVOKED in one state of a request that was revoked before it went in."
         => plain().hears_answer(|_, agv, answer| {
             let mut asked = agv.requests.zones.iter_mut();

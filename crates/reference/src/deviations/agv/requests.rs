@@ -135,6 +135,17 @@ records! {
                 answer.request_id.clone_from(id);
             }
         });
+    fault "responses-to-neighbours-taken" ["ZREQ-02", "ZONE-10", "REQ-14"] "It subscribes to the responses to all vehicles, and takes those that name a requestId of its own."
+        => joining(|agv, options| for (filter, _) in &mut options.subscriptions {
+            if agv.config.topic("responses") == Some(filter.as_str()) {
+                let mut levels: Vec<&str> = filter.split('/').collect();
+                levels.iter_mut().rev().skip(1).take(2).for_each(|level| *level = "+");
+                *filter = levels.join("/");
+            }
+        })
+        .allows(|_, _, what, usual| {
+            usual || matches!(what, Permission::HearAnother("responses", topic) if topic.ends_with("/responses"))
+        });
     fault "corridor-grant-kept-for-later" ["CORR-17", "CORR-16"] "It leaves its trajectory once more on an edge for which it was granted a corridor before, and does not ask again."
         => keep::<BTreeSet<u32>>()
             .hears_answer(|granted, agv, answer| {

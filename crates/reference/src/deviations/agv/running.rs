@@ -5,6 +5,9 @@ use crate::agv::order_message::Blocking;
 
 use super::prelude::*;
 
+/// So many metres before a node its actions may begin too early.
+const AHEAD: f64 = 2.0;
+
 records! {
     fault "single-beside-others" ["BLOCK-08", "BLOCK-10"] "It runs SINGLE actions in parallel with the others of their list."
         => plain().queues(|(), agv, _, phases| {
@@ -100,6 +103,22 @@ records! {
         => when(Event::OnEdge, |agv| if let Some(stop) = agv.order.nodes.front() {
             agv.trigger_actions(Origin::Node(stop.node.sequence_id));
         });
+    fault "node-actions-two-metres-ahead" ["NODE-04", "ASTATE-02"] "It begins the actions of a node two metres before it is there."
+        => plain()
+            .plans(|(), agv, leg| {
+                let waits = agv.actions.waiting_at(Origin::Node(leg.stop.node.sequence_id));
+                if waits && leg.is_whole() && leg.distance > AHEAD + 0.01 {
+                    (leg.way, leg.to_node) = (leg.distance - AHEAD, false);
+                }
+            })
+            .happens(|(), agv, event| if matches!(event, Event::OnEdge | Event::LegEnded) && agv.order.cancel.is_none() {
+                let pose = agv.motion.pose(agv.moment());
+                let near = |stop: &&Stop| stop.node.released && pose.distance(stop.place.x, stop.place.y) <= AHEAD + 0.01;
+                let ahead = agv.order.nodes.front().filter(near).map(|stop| stop.node.sequence_id);
+                if let Some(sequence_id) = ahead {
+                    agv.trigger_actions(Origin::Node(sequence_id));
+                }
+            });
     fault "none-aborted" ["ACT-01", "BLOCK-02"] "Breaks off the actions of type NONE of a node when it drives on."
         => plain().happens(|(), agv, event| if matches!(event, Event::EdgeEntered(_)) {
             let here = Origin::Node(agv.order.last_sequence);
@@ -201,6 +220,14 @@ records! {
         });
     fault "hard-starts-beside-none" ["BLOCK-05", "BLOCK-06"] "It starts a HARD action while a NONE action before it is still running."
         => forbidding(|_, what| matches!(what, Permission::Await(action, _) if action.request.blocking == Blocking::None));
+    fault "hard-begins-after-the-first-of-its-group" ["BLOCK-10", "BLOCK-05"] "It begins a HARD action as soon as the first of those that run in parallel before it has ended."
+        => forbidding(|agv, what| match what {
+            Permission::Await(action, origin) => agv.actions.lists.iter().filter(|list| list.origin == origin).any(|list| {
+                let ended = |id: &String| agv.actions.get(id).is_some_and(|other| other.status.is_terminal());
+                list.running.contains(&action.request.id) && list.running.iter().any(ended)
+            }),
+            _ => false,
+        });
     fault "hard-ignores-earlier-node" ["BLOCK-05"] "A HARD action begins although a NONE action of an earlier node or edge is still running."
         because "The node of the other action is left behind; that BLOCK-05 reaches so far is a matter of reading."
         => forbidding(|_, what| matches!(what, Permission::Await(action, origin) if action.origin != origin));

@@ -21,6 +21,14 @@ records! {
         => untold(|_, changes, _| changes.zone_sets, Telling::Later);
     fault "requests-without-state" ["STATE-21"] "Does not send a state when what it has asked for is answered."
         => untold(|agv, changes, _| changes.requests && asks_already(agv), Telling::Later);
+    fault "requests-told-with-other-changes" ["STATE-21", "REQ-06"] "It sends no state of its own for a new request or for what becomes of one, and shows it in the next state."
+        => plain().tells(|(), _, changes, requested| {
+            let alone = changes.requests && Changes { requests: false, ..changes } == Changes::default();
+            match alone && !requested {
+                true => Telling::Never,
+                false => Telling::Now,
+            }
+        });
     fault "node-without-state" ["STATE-06"] "Does not send a state when it drives over a node."
         => untold(|_, changes, _| changes.node && !changes.order, Telling::Never);
     fault "driving-without-state" ["STATE-08"] "Does not send a state when it starts or stops."

@@ -69,6 +69,11 @@ records! {
         });
     fault "cancel-ended-by-update" ["ORD-CANCEL-11", "ORD-CANCEL-02", "ORD-CANCEL-06"] "Ends a cancellation that is under way when an update comes, and drives it."
         => updating(|agv, _| revive(agv)).allows(|_, agv, what, usual| usual || matches!(what, Permission::Overlook(Objection::Cancelled)) && agv.order.cancel.is_some());
+    fault "update-ids-compared-as-text" ["ORD-UPD-18", "ORD-FLOW-09", "ORD-REJ-12"] "It compares orderUpdateId as text, so that the update 10 is older than the update 9."
+        => objecting(|agv, order, relation| {
+            let older = relation == Relation::Update && order.update_id.to_string() < agv.order.update_id.to_string();
+            older.then(|| Refusal::new(Rule::Outdated, "the order update is older than the current one"))
+        });
     fault "only-first-update" ["ORD-FLOW-09", "ORD-06"] "Refuses every further update of an order that was updated before."
         => since_update().objects(|updated, _, _, relation| (*updated && relation == Relation::Update).then(|| broken("no update is taken now")));
     fault "update-refused-while-acting" ["ORD-FLOW-09"] "Refuses updates while an action of the order runs."

@@ -15,6 +15,11 @@ records! {
         => visualization(|agv, m| if agv.motion.is_moving() { m.part("agvPosition", millimetres) });
     fault "visualization-without-position" ["VIS-01"] "Leaves the position out of the visualization." because "The schema requires nothing; by the ruling of VIS-01 what is merely absent is a warning."
         => visualization(|_, m| m.unset("agvPosition"));
+    fault "visualization-names-its-own-header-id" ["VIS-04"] "Its visualization names its own headerId in the place of that of a state."
+        => sending(|_, out| if out.name == "visualization" && out.message.contains_key("referenceStateHeaderId") {
+            let own = out.message.get("headerId").cloned().unwrap_or_default();
+            out.message.set("referenceStateHeaderId", own);
+        });
     fault "visualization-without-map" ["VIS-01"] "The agvPosition in its visualization has no mapId."
         => visualization(|_, m| m.part("agvPosition", |p| p.unset("mapId")));
     fault "visualization-velocity-scalar" ["VIS-01"] "It sends velocity in the visualization as a single number instead of an object."

@@ -3,10 +3,14 @@
 use crate::agv::hook_points::Passage;
 use crate::agv::motion::Pose;
 use crate::agv::order_message::ActionRequest;
+use crate::agv::path::{HALF_LENGTH, HALF_WIDTH};
 use crate::agv::zones::{Zone, ZoneKind};
 use tck_base::polygon::Point;
 
 use super::prelude::*;
+
+/// Why an order with a node in a BLOCKED zone is refused.
+const NO_WAY: &str = "no way leads to a node";
 
 /// Whether an error is about something else than being where the vehicle must not be.
 fn is_other(agv: &Agv, error: &ActiveError) -> bool {
@@ -69,6 +73,19 @@ records! {
         => forbidding(|_, what| matches!(what, Permission::HeedZone(zone) if matches!(zone.kind, ZoneKind::SpeedLimit(_))));
     fault "zone-speed-by-centre" ["ZINT-08", "ZONE-03", "ZONE-17"] "Keeps the speed of a SPEED_LIMIT zone only while its kinematic centre is inside."
         => forbidding(|_, what| matches!(what, Permission::GoByContour(zone) if matches!(zone.kind, ZoneKind::SpeedLimit(_))));
+    fault "zone-speed-until-the-centre-is-out" ["ZONE-03", "ZINT-08"] "It drives faster as soon as its kinematic centre has left a SPEED_LIMIT zone, while its rear is still inside."
+        => keep::<Crossing>()
+            .happens(|crossing, agv, event| if matches!(event, Event::Settled | Event::LegEnded) {
+                crossing.follow(agv);
+            })
+            .allows(|crossing, _, what, usual| usual && !matches!(what, Permission::HeedZone(zone) if crossing.left.contains(&zone.id)))
+            .plans(|crossing, agv, leg| {
+                // It looks where it is every few centimetres there.
+                let meets = speed_zones(agv).any(|zone| !crossing.left.contains(&zone.id) && is_beside(agv, zone));
+                if meets && leg.is_whole() && leg.distance > 0.2 {
+                    (leg.way, leg.to_node) = (0.1, false);
+                }
+            });
     fault "highest-zone-speed-taken" ["ZINT-04", "ZONE-17"] "Of overlapping SPEED_LIMIT zones it keeps the highest speed."
         => forbidding(|agv, what| match what {
             Permission::HeedZone(zone) => match zone.kind {
@@ -148,6 +165,19 @@ records! {
                 words.set("actionId", format!("zone-{}", action.request.action_type));
             }
             true
+        });
+    fault "zone-action-ids-of-the-place" ["ZACT-STATE-03", "ASTATE-06"] "It makes the actionId of an action of a zone from the zoneId and the place in the list, so that a second pass sets what is FINISHED back to RUNNING."
+        => plain().happens(|(), agv, event| if let Event::Triggering(origin @ Origin::Zone(_)) = event
+            && let Some((zone, passage)) = agv.heeding.acting.clone()
+        {
+            let ids: Vec<String> = agv.actions.iter().filter(|action| action.origin == origin).map(Action::id).collect();
+            for (at, id) in ids.iter().enumerate() {
+                let again = format!("{zone}-{passage:?}-{at}");
+                agv.actions.retain(|action| action.request.id != again);
+                if let Some(action) = agv.actions.get_mut(id) {
+                    action.request.id = again;
+                }
+            }
         });
     fault "zone-action-without-type" ["ZACT-STATE-03"] "Does not say of which type an action of a zone is." because "The ruling of ZACT-STATE-03 is a warning."
         => action(|_, action, words| {
@@ -245,6 +275,22 @@ records! {
         });
     fault "unreachable-node-tried-again" ["ZERR-02"] "Drives on to a node that was out of reach as soon as the way is free." because "A zone set that opens the way may count as an instruction."
         => letting(|_, what| matches!(what, Permission::TryAgain));
+    fault "unreachable-node-tried-every-20-seconds" ["ZERR-02", "ERR-07"] "Every 20 s it goes back a little, and tries once more to come to a node that was out of reach."
+        => keep::<Option<Moment>>()
+            .happens(|next, agv, event| match event {
+                Event::Settled if agv.order.unreachable && !agv.motion.is_moving() => {
+                    next.get_or_insert(agv.moment() + Duration::from_secs(20));
+                }
+                Event::Woken if next.take_if(|next| *next <= agv.moment()).is_some() && agv.order.unreachable && agv.may_drive() => {
+                    let (moment, speed) = (agv.moment(), agv.config.speed / 2.0);
+                    let pose = agv.motion.pose(moment);
+                    let back = (pose.x - pose.theta.cos() / 2.0, pose.y - pose.theta.sin() / 2.0);
+                    agv.order.unreachable = false;
+                    agv.motion.roll(moment, back, speed, true, false);
+                }
+                _ => {}
+            })
+            .due(|next, _| *next);
     fault "no-order-after-unreachable-node" ["ERR-07"] "Refuses every order once a node was out of reach, even when the order before was cancelled."
         => objecting(|agv, _, relation| {
             let name = &agv.config.errors.node_unreachable;
@@ -252,6 +298,22 @@ records! {
             (listed && relation == Relation::New).then(|| Refusal::new(Rule::OtherOrderActive, "a node was out of reach"))
         });
 
+    tolerance "nodes-in-blocked-zones-refused" ["ORD-REJ-22", "ZONE-02"] "It refuses an order with a node inside an enabled BLOCKED zone at once, since no way leads there."
+        => plain()
+            .objects(|(), agv, order, relation| {
+                let map = agv.motion.pose(agv.moment()).map_id;
+                let zones: Vec<&Zone> = agv.zones_in_force(&map).into_iter().map(|(_, zone)| zone).collect();
+                let blocked = |x: f64, y: f64| zones.iter().any(|zone| zone.kind == ZoneKind::Blocked && zone.area.contains(Point::new(x, y)));
+                let places = order.nodes.iter().filter_map(|node| agv.place(node));
+                let closed = places.into_iter().any(|place| place.map_id == map && blocked(place.x, place.y));
+                (closed && relation != Relation::Known).then(|| Refusal::new(Rule::Unable, NO_WAY))
+            })
+            .raises(|(), _, _, error| {
+                if error.description == NO_WAY {
+                    "NO_ROUTE_TO_TARGET".clone_into(&mut error.error_type);
+                }
+                true
+            });
     tolerance "zone-actions-planned-ahead" ["ZACT-STATE-06"] "It lists what the ACTION zone asks for that comes next on its way as WAITING before it is there."
         => state(|agv, words| {
             let planned = planned_actions(agv);
@@ -259,6 +321,50 @@ records! {
                 all.extend(planned);
             });
         });
+}
+
+/// SPEED_LIMIT zones by what its kinematic centre does.
+#[derive(Clone, Default)]
+struct Crossing {
+    /// The centre is inside.
+    within: Vec<String>,
+    /// The centre has left, and the rear has not yet.
+    left: Vec<String>,
+}
+
+impl Crossing {
+    fn follow(&mut self, agv: &Agv) {
+        let pose = agv.motion.pose(agv.moment());
+        for zone in speed_zones(agv) {
+            let is_inside = zone.area.contains(Point::new(pose.x, pose.y));
+            let was_inside = self.within.contains(&zone.id);
+            self.within.retain(|id| *id != zone.id);
+            if is_inside {
+                self.within.push(zone.id.clone());
+            } else if was_inside {
+                self.left.push(zone.id.clone());
+            }
+            if is_inside || !is_beside(agv, zone) {
+                self.left.retain(|id| *id != zone.id);
+            }
+        }
+    }
+}
+
+/// The SPEED_LIMIT zones that are in force where it is.
+fn speed_zones(agv: &Agv) -> impl Iterator<Item = &Zone> {
+    let map = agv.motion.pose(agv.moment()).map_id;
+    let sets = agv.zone_sets.all.iter();
+    let sets = sets.filter(move |set| set.enabled && set.map_id == map);
+    let zones = sets.flat_map(|set| &set.zones);
+    zones.filter(|zone| matches!(zone.kind, ZoneKind::SpeedLimit(_)))
+}
+
+/// Whether it is inside a zone, or so near that a part of it may be.
+fn is_beside(agv: &Agv, zone: &Zone) -> bool {
+    let pose = agv.motion.pose(agv.moment());
+    let centre = Point::new(pose.x, pose.y);
+    zone.area.contains(centre) || zone.area.to_border(centre) < HALF_LENGTH.hypot(HALF_WIDTH) + 0.1
 }
 
 /// Its poses on the way that is left, straight from node to node.
