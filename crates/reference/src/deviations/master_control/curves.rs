@@ -19,7 +19,10 @@ records! {
             c.set("controlPoints", json!([from, between(&from, &to, 0.5), to]));
         });
     fault "curve-of-one-point" ["ORD-MSG-31"] "Trajectories have a single control point, the end of the edge."
-        => curve(|c| c.list("controlPoints").drain(..1).for_each(drop));
+        => curve(|c| {
+            let end = c.list("controlPoints").last().cloned().unwrap_or_default();
+            c.set("controlPoints", json!([end]));
+        });
     fault "degree-is-order" ["ORD-MSG-29"]
         "It sends the order of a curve, one more than its degree, as the degree of a trajectory, so that the knot vector is too short for it."
         => curve(|c| c.set("degree", c["degree"].as_u64().unwrap_or_default() + 1));
