@@ -125,6 +125,7 @@ pub(super) fn need(node: &Node, problems: &mut Problems) -> Option<Need> {
         ["not", "required", path] => Need::NotRequired(owned(path)),
         ["vantage", "tap"] => Need::Tap,
         ["maps"] => Need::MapServer,
+        ["files", "over", "TLS"] => Need::SecuredFiles,
         ["hook", name] => Need::Hook(owned(name)),
         ["profile", name] => Need::Profile(owned(name)),
         ["limit", name] => Need::Limit(owned(name)),

@@ -1,6 +1,7 @@
 //! Deviations of going to sleep, waking up and leaving, and of the triggers that actions wait for (section 6.2.3.1 of 3.0).
 
 use super::prelude::*;
+use crate::agv::certificate_set::Flaw;
 use crate::agv::report::Telling;
 
 records! {
@@ -135,6 +136,30 @@ records! {
         => letting(|_, what| matches!(what, Permission::HeedTrigger(action) if action.status == Status::Running));
     fault "certificate-fetched-in-clear" ["CERT-03"] "It fetches key and certificate over plain HTTP, and takes them over."
         => forbidding(|_, what| matches!(what, Permission::RefusePlainLink));
+    fault "certificate-not-downloaded" ["CERT-01"] "It reports updateCertificate FINISHED without having fetched a file."
+        => forbidding(|_, what| matches!(what, Permission::FetchForCertificate(_)));
+    fault "certificate-key-kept" ["CERT-01"] "It fetches a new certificate, and goes on with the key it has."
+        => forbidding(|_, what| matches!(what, Permission::FetchForCertificate("keyDownloadLink")));
+    fault "certificate-authority-kept" ["CERT-01"] "It does not fetch the authority that a new certificate comes with." because "The parameter is optional: a warning."
+        => forbidding(|_, what| matches!(what, Permission::FetchForCertificate("certificateAuthorityDownloadLink")));
+    fault "certificate-never-active" ["CERT-01"] "It leaves updateCertificate RUNNING for ever when it has all files."
+        => action(|_, action, m| {
+            if is(action, Effect::UpdateCertificate) && action.status == Status::Finished {
+                m.set("actionStatus", "RUNNING");
+            }
+            true
+        });
+    fault "certificate-taken-for-broken" ["CERT-01"] "It fetches a certificate with its key, and reports updateCertificate FAILED however good they are."
+        => after(Effect::UpdateCertificate, |_, action, outcome| match outcome {
+            Outcome::Done(_) => Outcome::Failed(Problem::unable(action, "the certificate cannot be used")),
+            other => other,
+        });
+    fault "broken-certificate-activated" ["CERT-02"] "It takes a file over that is no certificate, and reports updateCertificate FINISHED."
+        => forbidding(|_, what| matches!(what, Permission::RefuseCertificate(Flaw::Unreadable)));
+    fault "other-key-activated" ["CERT-02"] "It takes a key over that does not belong to the certificate, and reports updateCertificate FINISHED."
+        => forbidding(|_, what| matches!(what, Permission::RefuseCertificate(Flaw::OtherKey)));
+    fault "certificate-chain-unchecked" ["CERT-04"] "It takes a certificate over that does not lead to the authority it came with." because "It breaks a recommendation only."
+        => forbidding(|_, what| matches!(what, Permission::RefuseCertificate(Flaw::Stray)));
     tolerance "never-waits-for-a-retry" ["RETRY-01"] "A retriable action that fails is FAILED at once."
         => failure(|agv, action, _| {
             if action.status == Status::Retriable {
