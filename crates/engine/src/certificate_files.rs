@@ -151,8 +151,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("ca.crt");
         std::fs::write(&path, "site").unwrap();
-        let both = files.content(CertificateFile::Authority, ("a", "x"), now, &[path]).unwrap();
+        let both = files
+            .content(CertificateFile::Authority, ("a", "x"), now, &[path])
+            .unwrap();
         let both = String::from_utf8(both.to_vec()).unwrap();
-        assert!(both.starts_with("-----BEGIN CERTIFICATE-----") && both.ends_with("-----\nsite\n"), "{both}");
+        assert!(
+            both.starts_with("-----BEGIN CERTIFICATE-----") && both.ends_with("-----\nsite\n"),
+            "{both}"
+        );
     }
 }

@@ -32,7 +32,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
             name: serve.name.clone(),
             body,
             behaviour: serve.behaviour,
-            secured: serve.secured,
+            secured: serve.certificate.is_some(),
         };
         let url = self.link.serve(offer).await?;
         self.note(Event::Served {
@@ -53,7 +53,9 @@ impl<L: Link, O: Operator> Engine<L, O> {
         let now = self.link.now().utc;
         let trusted = self.link.trusted();
         let test = self.recorder.judge().current().map(|test| test.test().id.clone());
-        let device = bindings.get("device").and_then(|device| device["serialNumber"].as_str());
+        let device = bindings
+            .get("device")
+            .and_then(|device| device["serialNumber"].as_str());
         let of = (test.as_deref().unwrap_or_default(), device.unwrap_or_default());
         self.certificate_files.content(file, of, now, &trusted)
     }

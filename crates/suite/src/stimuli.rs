@@ -15,7 +15,7 @@ use tck_journal::event::{Direction, LinkFault};
 pub(super) const SEND_KEYS: &[&str] = &[
     "route", "payload", "action", "as", "with", "withAll", "blocking", "actions", "patch", "raw", "qos", "retain",
 ];
-pub(super) const SERVE_KEYS: &[&str] = &["file", "json", "certificate", "plain", "behaviour"];
+pub(super) const SERVE_KEYS: &[&str] = &["file", "json", "certificate", "behaviour"];
 pub(super) const OPERATOR_KEYS: &[&str] = &["with", "within", "each"];
 pub(super) const VEHICLE_KEYS: &[&str] = &["with", "of"];
 
@@ -393,11 +393,8 @@ pub(super) fn link(word: &str, fields: &Fields<'_>, at: &Span, problems: &mut Pr
 
 pub(super) fn serve(served: &Node, fields: &Fields<'_>, problems: &mut Problems) -> Option<Serve> {
     exclusive(fields, "certificate", &["file", "json"], problems);
-    let certificate = fields.word("certificate", "unknown-certificate-file", &CERTIFICATE_FILES, problems);
-    let plain = fields.flag("plain", problems);
     Some(Serve {
-        certificate,
-        secured: certificate.is_some() && !plain,
+        certificate: fields.word("certificate", "unknown-certificate-file", &CERTIFICATE_FILES, problems),
         file: fields.get("file", problems).map(|node| {
             text_of(node, problems);
             term(node, problems)

@@ -75,7 +75,13 @@ impl Agv {
 
     /// Uses what was fetched from now on, unless something is wrong with it (CERT-02, CERT-04).
     fn activated(&self, action: &Action) -> Outcome {
-        let file = |wanted| action.files.iter().find(|(key, _)| *key == wanted).map(|(_, file)| file);
+        let file = |wanted| {
+            action
+                .files
+                .iter()
+                .find(|(key, _)| *key == wanted)
+                .map(|(_, file)| file)
+        };
         let (Some(key), Some(certificate)) = (file(KEY), file(CERTIFICATE)) else {
             return Outcome::Done(None);
         };

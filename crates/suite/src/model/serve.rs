@@ -12,10 +12,8 @@ pub struct Serve {
     pub file: Option<Term>,
     /// A JSON document that is served instead of a file.
     pub json: Option<Term>,
-    /// A file of a certificate of the harness that is served instead.
+    /// A file of a certificate of the harness that is served instead, over TLS.
     pub certificate: Option<CertificateFile>,
-    /// Whether it is served over TLS.
-    pub secured: bool,
     /// How it is served.
     pub behaviour: ServeBehaviour,
 }

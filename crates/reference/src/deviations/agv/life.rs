@@ -135,7 +135,7 @@ records! {
     fault "any-trigger-will-do" ["ACT-37"] "A button on the vehicle ends what waits for the fleet control alone." because "The text does not say that nothing else may end it."
         => letting(|_, what| matches!(what, Permission::HeedTrigger(action) if action.status == Status::Running));
     fault "certificate-fetched-in-clear" ["CERT-03"] "It fetches key and certificate over plain HTTP, and takes them over."
-        => forbidding(|_, what| matches!(what, Permission::RefusePlainLink));
+        => forbidding(|_, what| matches!(what, Permission::RefusePlainLink | Permission::RefuseCertificate(Flaw::Unreadable)));
     fault "certificate-not-downloaded" ["CERT-01"] "It reports updateCertificate FINISHED without having fetched a file."
         => forbidding(|_, what| matches!(what, Permission::FetchForCertificate(_)));
     fault "certificate-key-kept" ["CERT-01"] "It fetches a new certificate, and goes on with the key it has."
