@@ -13,7 +13,7 @@ pub(super) struct CertificateFiles {
 
 /// What was made, as PEM.
 #[derive(Debug)]
-#[cfg_attr(not(feature = "tls"), expect(dead_code, reason = "without TLS nothing is made"))]
+#[cfg_attr(not(feature = "tls"), allow(dead_code, reason = "without TLS nothing is made"))]
 struct Made {
     authority: String,
     certificate: String,

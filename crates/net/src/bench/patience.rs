@@ -90,6 +90,14 @@ impl SecuredListener {
         Self::begin(listener, tls, true)
     }
 
+    #[cfg_attr(
+        not(feature = "tls"),
+        allow(
+            unused_variables,
+            unused_assignments,
+            reason = "without TLS nobody has a certificate"
+        )
+    )]
     fn begin(listener: TcpListener, tls: TlsServer, takes_plain: bool) -> Self {
         let address = listener.local_addr();
         let (sender, secured) = mpsc::channel(1);

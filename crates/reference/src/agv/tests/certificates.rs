@@ -29,7 +29,7 @@ fn good() -> Files {
 /// What comes of a set.
 fn given(files: &[String], faults: &[&str]) -> String {
     let mut config = config();
-    config.features.push("certificates".into());
+    config.features.insert("certificates".into());
     let mut bench = Bench::with(config, faults);
     let mut parameters = json!({ "service": "MQTT" });
     for link in &LINKS[..files.len()] {

@@ -140,6 +140,8 @@ records! {
         => forbidding(|_, what| matches!(what, Permission::FetchForCertificate(_)));
     fault "certificate-key-kept" ["CERT-01"] "It fetches a new certificate, and goes on with the key it has."
         => forbidding(|_, what| matches!(what, Permission::FetchForCertificate("keyDownloadLink")));
+    fault "old-certificate-kept" ["CERT-01"] "It fetches a new key, and goes on with the certificate it has."
+        => forbidding(|_, what| matches!(what, Permission::FetchForCertificate("certificateDownloadLink")));
     fault "certificate-authority-kept" ["CERT-01"] "It does not fetch the authority that a new certificate comes with." because "The parameter is optional: a warning."
         => forbidding(|_, what| matches!(what, Permission::FetchForCertificate("certificateAuthorityDownloadLink")));
     fault "certificate-never-active" ["CERT-01"] "It leaves updateCertificate RUNNING for ever when it has all files."
