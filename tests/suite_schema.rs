@@ -146,7 +146,7 @@ fn every_suite_is_valid() {
 
 #[test]
 fn mistakes_of_form_are_refused() {
-    const OF_FORM: [&str; 19] = [
+    const OF_FORM: [&str; 20] = [
         "always-without-extent",
         "bad-duration",
         "bad-need",
@@ -160,6 +160,7 @@ fn mistakes_of_form_are_refused() {
         "monitor-rule",
         "recordings-without-reason",
         "unknown-behaviour",
+        "unknown-certificate-file",
         "unknown-device",
         "unknown-fault",
         "unknown-operator",

@@ -32,6 +32,7 @@ mod layouts;
 mod messages_only;
 mod migrating;
 mod mosquitto;
+mod new_certificates;
 mod output;
 mod overhearing;
 mod own_rules;

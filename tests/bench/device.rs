@@ -101,6 +101,7 @@ async fn a_reference_device_runs_over_tcp() {
             name: "map".to_owned(),
             body: Bytes::from_static(b"map"),
             behaviour,
+            secured: false,
         };
         let url = rig.link.serve(offer).await.unwrap();
         assert!(device.command("fetch", url.into()).await);

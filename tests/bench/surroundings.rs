@@ -35,6 +35,7 @@ async fn map_files_are_served_well_and_badly() {
             name: "hall 1".to_owned(),
             body: body.clone(),
             behaviour,
+            secured: false,
         };
         let url = rig.link.serve(offer).await.unwrap();
         let fetched = tokio::task::spawn_blocking(move || -> Result<Vec<u8>, ureq::Error> {

@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+mod certificate_files;
 mod compose;
 mod compose_error;
 mod flood;
@@ -16,12 +17,15 @@ mod operator;
 mod operator_steps;
 mod recorder;
 mod route;
+mod serving;
 pub mod vehicle;
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::{Map, Value, json};
+
+use certificate_files::CertificateFiles;
 
 pub use compose::Composer;
 pub use compose_error::ComposeError;
@@ -34,7 +38,7 @@ use tck_base::clock::Moment;
 use tck_base::device::Publication;
 use tck_journal::event::{Event, Occurrence, Payload, StepEnd};
 use tck_judge::{JudgeError, Progress, Sign, TestJudge};
-use tck_net::bench::{LinkError, Offer};
+use tck_net::bench::LinkError;
 use tck_net::link::Link;
 use tck_pack::HookEffect;
 use tck_suite::model::{Purpose, Section, Step, Test, Verb, place_in_body};
@@ -90,6 +94,8 @@ pub struct Engine<L, O> {
     pub cancels: bool,
     /// Map files the device can read; without one, ours are served.
     pub map_files: Vec<bytes::Bytes>,
+    /// What the device is given as its certificate.
+    certificate_files: CertificateFiles,
     /// Which time a test is run, where tests are repeated.
     pub repetition: Option<u32>,
     /// Whether nobody has answered a question of the test that runs, or ran last.
@@ -119,6 +125,7 @@ impl<L: Link, O: Operator> Engine<L, O> {
             composer,
             cancels: true,
             map_files: Vec::new(),
+            certificate_files: CertificateFiles::default(),
             repetition: None,
             unanswered: false,
             cancelled_in_vain: false,
@@ -545,36 +552,6 @@ impl<L: Link, O: Operator> Engine<L, O> {
             self.told_gone = since;
             watcher.gone(&gone.to_string());
         }
-    }
-
-    async fn serve(&mut self, serve: &tck_suite::model::Serve) -> Result<StepEnd, EngineError> {
-        let bindings = self
-            .recorder
-            .judge()
-            .current()
-            .map(|test| test.bindings().clone())
-            .unwrap_or_default();
-        let body = match map_file::content(serve, &bindings, &self.map_files) {
-            Ok(body) => body,
-            Err(why) => return Ok(StepEnd::Broken(why)),
-        };
-        let sha256 = map_file::sha256(&body);
-        let offer = Offer {
-            name: serve.name.clone(),
-            body,
-            behaviour: serve.behaviour,
-        };
-        let url = self.link.serve(offer).await?;
-        self.note(Event::Served {
-            name: serve.name.clone(),
-            url: url.clone(),
-            behaviour: serve.behaviour.word().to_owned(),
-        })?;
-        self.bind(
-            &format!("serve.{}", serve.name),
-            json!({ "url": url, "sha256": sha256 }),
-        )?;
-        Ok(StepEnd::Decided)
     }
 }
 

@@ -63,6 +63,8 @@ pub enum Reason {
         /// The host that the device connects to.
         device: String,
     },
+    /// The bench serves no files over TLS that the device would trust.
+    NoSecuredFiles,
     /// The profile names no map file.
     NoMapFile,
     /// The profile names one vehicle for a master control.
@@ -265,6 +267,9 @@ impl fmt::Display for Reason {
             Self::MapServerElsewhere { host, device } => write!(
                 f,
                 "a device that connects to {device} cannot fetch a map from {host} ([bench] maps-listen and maps-host)"
+            ),
+            Self::NoSecuredFiles => f.write_str(
+                "the bench has no certificate with which it could serve files over TLS ([bench] tls-cert and tls-key)",
             ),
             Self::NoMapFile => f.write_str("the profile names no map file that the device can read ([maps] files)"),
             Self::MotionNotAllowed => f.write_str("the profile does not allow motion ([motion] allowed = true)"),

@@ -132,6 +132,11 @@ pub const STATEMENTS: &[Statement] = &[
         doc: "Tests may put zones of their own on the nodes and edges of the course: no other vehicle goes by them, and the \
               vehicle may be moved where one has stopped it.",
     },
+    Statement {
+        name: "certificate-may-change",
+        doc: "Tests may give the vehicle certificates of the harness for its connection; somebody puts the right one back \
+              afterwards. What it trusts from then on is an authority of the harness and those in `tls-ca` and `tls-cert`.",
+    },
 ];
 
 /// What the harness finds out by itself at the beginning of a run; tests ask for it as for a statement.
@@ -344,6 +349,7 @@ pub const KEYS: &[Key] = &[
     key("device.room-beside-edges", Kind::Flag),
     key("device.extends-base", Kind::Flag),
     key("device.zones-on-course", Kind::Flag),
+    key("device.certificate-may-change", Kind::Flag),
     key("device.long-action", Kind::Action(Place::Anywhere)),
     key("device.brief-action", Kind::Action(Place::Anywhere)),
     key("device.uninterruptible-action", Kind::Action(Place::Anywhere)),

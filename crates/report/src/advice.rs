@@ -24,6 +24,9 @@ pub(super) fn remedy(reason: &Reason) -> Option<String> {
         Reason::MapServerUnreachable { .. } | Reason::MapServerElsewhere { .. } => {
             "[bench] maps-listen and maps-host: let the device reach the map server".to_owned()
         }
+        Reason::NoSecuredFiles => {
+            "[bench] tls-cert and tls-key: name a certificate of this machine that the device trusts".to_owned()
+        }
         Reason::OneVehicle => {
             "[vehicles] serial-numbers = […, …]: name another vehicle that the master control knows".to_owned()
         }

@@ -39,6 +39,8 @@ pub struct Capabilities {
     pub unattended: Vec<String>,
     /// Whether the device can reach the map server; `Err` says why not.
     pub maps: Result<(), Reason>,
+    /// Whether files are served to it over TLS; `Err` says why not.
+    pub secured_files: Result<(), Reason>,
     /// Whether there is a map file that the device can read; `Err` says why not.
     pub map_file: Result<(), Reason>,
     /// Whether the vehicle may drive; `Err` says why not.
@@ -118,6 +120,10 @@ impl Capabilities {
             Need::Tap if self.vantage == Vantage::Tap => Gate::Runs,
             Need::Tap => Gate::Unobservable(Reason::NoTap),
             Need::MapServer => match &self.maps {
+                Ok(()) => Gate::Runs,
+                Err(why) => Gate::Unobservable(why.clone()),
+            },
+            Need::SecuredFiles => match self.maps.as_ref().and(self.secured_files.as_ref()) {
                 Ok(()) => Gate::Runs,
                 Err(why) => Gate::Unobservable(why.clone()),
             },
@@ -310,6 +316,7 @@ fn serves_a_map_to_read(test: &Test) -> bool {
         Verb::Serve(serve) => {
             serve.file.is_none()
                 && serve.json.is_none()
+                && serve.certificate.is_none()
                 && matches!(serve.behaviour, ServeBehaviour::Well | ServeBehaviour::Slow)
         }
         _ => false,
@@ -349,6 +356,7 @@ pub(crate) fn unknown() -> Capabilities {
         hooks: Vec::new(),
         unattended: Vec::new(),
         maps: Ok(()),
+        secured_files: Ok(()),
         map_file: Ok(()),
         motion: Ok(()),
         second_vehicle: true,

@@ -19,7 +19,7 @@ use super::selection::Selection;
 use super::session::{Finished, Patience, Progress, run};
 use super::setup::{BenchFacts, DeviceUnderTest};
 use super::sheet::Sheet;
-use super::site::{Topics, bench_of, certificates, reach, resolve};
+use super::site::{Topics, bench_of, certificates, reach, resolve, secured_files};
 use super::virtual_run::{Silent, VirtualRun, run_silently};
 use tck_base::clock::WallClock;
 use tck_base::diagnostic::Diagnostic;
@@ -260,6 +260,7 @@ impl LiveRun {
             unattended: Vec::new(),
             limits: Vec::new(),
             maps: self.maps,
+            secured_files: secured_files(&self.options),
         };
         let retained = match (&self.device.fleet, &self.options.broker) {
             (Some(fleet), BrokerChoice::External { .. }) => fleet.retained(),
@@ -325,6 +326,7 @@ impl LiveRun {
                 ));
             }
         }
+        let secured_files = secured_files(&self.options);
         let (link, info) = MqttBench::start(self.options).await?;
         let stage = Stage {
             library,
@@ -334,6 +336,7 @@ impl LiveRun {
             device: self.device,
             request: self.request,
             maps: self.maps,
+            secured_files,
             vantage,
             clock,
             earlier: self.earlier,
@@ -402,6 +405,7 @@ struct Stage<'a> {
     device: DeviceUnderTest,
     request: Request,
     maps: Result<(), Reason>,
+    secured_files: Result<(), Reason>,
     vantage: Vantage,
     clock: WallClock,
     earlier: Option<Journal>,
@@ -453,6 +457,7 @@ impl Stage<'_> {
             unattended: operator.unattended(),
             limits: info.limits.clone(),
             maps: self.maps,
+            secured_files: self.secured_files,
         };
         let fleet = self.device.fleet.clone();
         let composer = Composer::new(&self.request.run).in_manners(self.request.manners.clone());

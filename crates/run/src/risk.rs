@@ -29,6 +29,8 @@ enum Risk {
     Faults,
     /// It is switched off, sent to sleep, or may not find back to the broker.
     Power,
+    /// Its certificate is replaced, so that it may not be let in any more.
+    Certificate,
 }
 
 /// So many rows of a table come in their place; the others are look-alikes, and come behind.
@@ -96,6 +98,7 @@ fn risk(test: &Test, hooks: &Hooks) -> Risk {
                 let hook = hooks.find(&operator.hook, test.device);
                 hook.map_or(Risk::ByHand, |hook| hook.risk.into())
             }
+            Verb::Serve(serve) if serve.certificate.is_some() => Risk::Certificate,
             Verb::Serve(_) => Risk::Maps,
             Verb::Send(send) if send.topic == "zoneSet" => Risk::Maps,
             Verb::Send(_) => of_text(step.span.text()),

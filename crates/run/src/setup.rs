@@ -203,6 +203,7 @@ impl DeviceUnderTest {
             hooks: bench.hooks,
             unattended: bench.unattended,
             maps: bench.maps,
+            secured_files: bench.secured_files,
             map_file,
             motion: self.motion,
             second_vehicle: vehicles > 1,
@@ -238,6 +239,8 @@ pub struct BenchFacts {
     pub unattended: Vec<String>,
     /// Whether the device can reach the map server; `Err` says why not.
     pub maps: Result<(), Reason>,
+    /// Whether files are served to it over TLS; `Err` says why not.
+    pub secured_files: Result<(), Reason>,
     /// What the broker does not allow, and what cannot be said therefore.
     pub limits: Vec<String>,
 }

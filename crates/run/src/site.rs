@@ -152,6 +152,14 @@ pub(super) fn reach(options: &BenchOptions, starts_device: bool) -> Result<(), R
     Ok(())
 }
 
+/// Whether files are served over TLS; `Err` says why not. A device trusts the certificate that the tap shows it.
+pub(super) fn secured_files(options: &BenchOptions) -> Result<(), Reason> {
+    match options.tls {
+        Some(_) => Ok(()),
+        None => Err(Reason::NoSecuredFiles),
+    }
+}
+
 fn host_of(address: &str) -> &str {
     let host = address.rsplit_once(':').map_or(address, |(host, _)| host);
     host.trim_start_matches('[').trim_end_matches(']')

@@ -182,6 +182,7 @@ pub async fn run_virtually(
         unattended: operator.unattended(),
         limits: Vec::new(),
         maps: Ok(()),
+        secured_files: Ok(()),
     };
     let composer = Composer::new(&request.run).in_manners(request.manners.clone());
     let asked = Request {

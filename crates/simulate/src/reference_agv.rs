@@ -292,6 +292,11 @@ impl ReferenceAgv {
             .retain(|feature| feature != "maps" && feature != "mapActions");
     }
 
+    /// Whether its version knows certificates of vehicles.
+    fn has_certificates(&self) -> bool {
+        self.config.features.iter().any(|feature| feature == "certificates")
+    }
+
     /// What a profile would state about it.
     #[must_use]
     pub fn statements(&self) -> BTreeMap<String, bool> {
@@ -312,6 +317,7 @@ impl ReferenceAgv {
             ("zones-on-course", self.config.branches.is_none()),
         ]
         .into_iter()
+        .chain(self.has_certificates().then_some(("certificate-may-change", true)))
         .chain(
             SAMPLE_ACTIONS
                 .iter()

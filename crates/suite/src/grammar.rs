@@ -125,6 +125,7 @@ pub(super) fn need(node: &Node, problems: &mut Problems) -> Option<Need> {
         ["not", "required", path] => Need::NotRequired(owned(path)),
         ["vantage", "tap"] => Need::Tap,
         ["maps"] => Need::MapServer,
+        ["files", "over", "TLS"] => Need::SecuredFiles,
         ["hook", name] => Need::Hook(owned(name)),
         ["profile", name] => Need::Profile(owned(name)),
         ["limit", name] => Need::Limit(owned(name)),
@@ -141,6 +142,7 @@ pub(super) fn need(node: &Node, problems: &mut Problems) -> Option<Need> {
                 "not required PATH",
                 "vantage tap",
                 "maps",
+                "files over TLS",
                 "hook NAME",
                 "profile NAME",
                 "limit NAME",
@@ -278,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn needs_have_ten_forms() {
+    fn needs_have_known_forms() {
         for text in [
             "action downloadMap",
             "action pick NODE",
@@ -287,6 +289,7 @@ mod tests {
             "no optional order.edges.trajectory",
             "vantage tap",
             "maps",
+            "files over TLS",
             "hook power-cycle",
             "profile stops-between-nodes",
             "limit maxArrayLens.order.nodes",

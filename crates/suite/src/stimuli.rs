@@ -5,7 +5,7 @@ use base64::Engine as _;
 use super::fields::{Fields, Problems, text_of, word_of};
 use super::grammar::{course_name, place, time};
 use super::model::{
-    LinkStep, Operator, Patch, Raw, Route, Send, SendAction, Serve, ServeBehaviour, VehicleStep, Which,
+    CertificateFile, LinkStep, Operator, Patch, Raw, Route, Send, SendAction, Serve, ServeBehaviour, VehicleStep, Which,
 };
 use super::terms::{named_terms, term};
 use tck_base::diagnostic::Span;
@@ -27,7 +27,7 @@ pub(super) const SEND_KEYS: &[&str] = &[
     "retain",
     "neighbour",
 ];
-pub(super) const SERVE_KEYS: &[&str] = &["file", "json", "behaviour"];
+pub(super) const SERVE_KEYS: &[&str] = &["file", "json", "certificate", "behaviour"];
 pub(super) const OPERATOR_KEYS: &[&str] = &["with", "within", "each"];
 pub(super) const VEHICLE_KEYS: &[&str] = &["with", "of"];
 
@@ -42,6 +42,16 @@ const FAULTS: [(&str, &[&str]); 7] = [
     ("duplicate", &["topic", "count", "direction"]),
     ("refuse", &[]),
     ("restore", &[]),
+];
+
+/// The words of `certificate`.
+const CERTIFICATE_FILES: [(&str, CertificateFile); 6] = [
+    ("authority", CertificateFile::Authority),
+    ("certificate", CertificateFile::Certificate),
+    ("key", CertificateFile::Key),
+    ("stray-certificate", CertificateFile::StrayCertificate),
+    ("other-key", CertificateFile::OtherKey),
+    ("broken-certificate", CertificateFile::BrokenCertificate),
 ];
 
 const BEHAVIOURS: [(&str, ServeBehaviour); 7] = [
@@ -395,7 +405,9 @@ pub(super) fn link(word: &str, fields: &Fields<'_>, at: &Span, problems: &mut Pr
 }
 
 pub(super) fn serve(served: &Node, fields: &Fields<'_>, problems: &mut Problems) -> Option<Serve> {
+    exclusive(fields, "certificate", &["file", "json"], problems);
     Some(Serve {
+        certificate: fields.word("certificate", "unknown-certificate-file", &CERTIFICATE_FILES, problems),
         file: fields.get("file", problems).map(|node| {
             text_of(node, problems);
             term(node, problems)

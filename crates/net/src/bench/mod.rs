@@ -31,6 +31,8 @@ pub struct Offer {
     pub body: bytes::Bytes,
     /// How it is served.
     pub behaviour: ServeBehaviour,
+    /// Whether it is served over TLS, and not without.
+    pub secured: bool,
 }
 
 /// Why a link could not do what it was asked.

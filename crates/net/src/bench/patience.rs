@@ -7,9 +7,10 @@ use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
-use axum::serve::Listener;
+use axum::extract::connect_info::Connected;
+use axum::serve::{IncomingStream, Listener};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::net::TcpListener;
+use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 use tokio::task::JoinHandle;
 use tokio::time::Sleep;
@@ -21,6 +22,8 @@ use super::stream::Stream;
 const HEAD_LIMIT: Duration = Duration::from_secs(10);
 /// How many connections are open at a time.
 const CONNECTIONS: usize = 64;
+/// What a connection begins with that is to be secured: the type of a handshake record of TLS.
+const HANDSHAKE: u8 = 0x16;
 /// How long to wait when the system has no file handle left.
 const NO_HANDLE: Duration = Duration::from_millis(100);
 
@@ -54,7 +57,7 @@ impl Listener for PatientListener {
             };
             match self.listener.accept().await {
                 Ok((stream, peer)) => {
-                    return (HttpConnection::begin(Box::new(stream), self.limit, place), peer);
+                    return (HttpConnection::begin(Box::new(stream), false, self.limit, place), peer);
                 }
                 Err(_) => tokio::time::sleep(NO_HANDLE).await,
             }
@@ -66,7 +69,8 @@ impl Listener for PatientListener {
     }
 }
 
-/// A port that serves HTTP over TLS to few clients at a time. One that is slow to shake hands keeps nobody else waiting.
+/// A port that serves HTTP over TLS to few clients at a time, or with and without TLS. One that is slow to shake hands keeps
+/// nobody else waiting.
 pub struct SecuredListener {
     address: io::Result<SocketAddr>,
     secured: mpsc::Receiver<(HttpConnection, SocketAddr)>,
@@ -76,15 +80,25 @@ pub struct SecuredListener {
 impl SecuredListener {
     /// Serves on a port that is open already, and shows a certificate there.
     #[must_use]
+    pub fn new(listener: TcpListener, tls: TlsServer) -> Self {
+        Self::begin(listener, tls, false)
+    }
+
+    /// Serves on a port that is open already, and shows a certificate to those who begin with TLS.
+    #[must_use]
+    pub fn beside_plain(listener: TcpListener, tls: TlsServer) -> Self {
+        Self::begin(listener, tls, true)
+    }
+
     #[cfg_attr(
         not(feature = "tls"),
-        expect(
+        allow(
             unused_variables,
             unused_assignments,
             reason = "without TLS nobody has a certificate"
         )
     )]
-    pub fn new(listener: TcpListener, tls: TlsServer) -> Self {
+    fn begin(listener: TcpListener, tls: TlsServer, takes_plain: bool) -> Self {
         let address = listener.local_addr();
         let (sender, secured) = mpsc::channel(1);
         let places = Arc::new(Semaphore::new(CONNECTIONS));
@@ -96,8 +110,9 @@ impl SecuredListener {
                 };
                 let (tls, sender) = (tls.clone(), sender.clone());
                 tokio::spawn(async move {
-                    if let Ok(Ok(stream)) = tokio::time::timeout(HEAD_LIMIT, tls.accept(stream)).await {
-                        let connection = HttpConnection::begin(Box::new(stream), HEAD_LIMIT, place);
+                    let opened = tokio::time::timeout(HEAD_LIMIT, opened(stream, &tls, takes_plain)).await;
+                    if let Ok(Ok((stream, over_tls))) = opened {
+                        let connection = HttpConnection::begin(stream, over_tls, HEAD_LIMIT, place);
                         let _ = sender.send((connection, peer)).await;
                     }
                 });
@@ -108,6 +123,34 @@ impl SecuredListener {
             secured,
             accepting,
         }
+    }
+}
+
+/// A connection that is secured, unless plain ones are taken and it begins as one; and whether it is.
+async fn opened(stream: TcpStream, tls: &TlsServer, takes_plain: bool) -> io::Result<(Box<dyn Stream>, bool)> {
+    if takes_plain {
+        let mut first = [0];
+        if stream.peek(&mut first).await? == 0 || first != [HANDSHAKE] {
+            return Ok((Box::new(stream), false));
+        }
+    }
+    let secured = tls.accept(stream).await?;
+    Ok((Box::new(secured), true))
+}
+
+/// Whether a request came over TLS.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OverTls(pub bool);
+
+impl Connected<IncomingStream<'_, PatientListener>> for OverTls {
+    fn connect_info(stream: IncomingStream<'_, PatientListener>) -> Self {
+        Self(stream.io().over_tls)
+    }
+}
+
+impl Connected<IncomingStream<'_, SecuredListener>> for OverTls {
+    fn connect_info(stream: IncomingStream<'_, SecuredListener>) -> Self {
+        Self(stream.io().over_tls)
     }
 }
 
@@ -136,6 +179,7 @@ impl Listener for SecuredListener {
 /// A connection of a client, which ends when the head of its first request does not come.
 pub struct HttpConnection {
     stream: Box<dyn Stream>,
+    over_tls: bool,
     head: Head,
     limit: Pin<Box<Sleep>>,
     /// The place it takes until it is dropped.
@@ -143,9 +187,10 @@ pub struct HttpConnection {
 }
 
 impl HttpConnection {
-    fn begin(stream: Box<dyn Stream>, limit: Duration, place: OwnedSemaphorePermit) -> Self {
+    fn begin(stream: Box<dyn Stream>, over_tls: bool, limit: Duration, place: OwnedSemaphorePermit) -> Self {
         Self {
             stream,
+            over_tls,
             head: Head::default(),
             limit: Box::pin(tokio::time::sleep(limit)),
             _place: place,

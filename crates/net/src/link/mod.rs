@@ -44,6 +44,11 @@ pub trait Link {
     /// Offers a file; returns its address as the device must use it.
     async fn serve(&mut self, offer: Offer) -> Result<String, LinkError>;
 
+    /// PEM files with the certificates that a device has to trust if it is to find back to this bench.
+    fn trusted(&self) -> Vec<std::path::PathBuf> {
+        Vec::new()
+    }
+
     /// How long messages took through the tap, as far as that was the harness's own time; `None` without a tap.
     fn time_to_pass_on(&self) -> Option<Spread> {
         None

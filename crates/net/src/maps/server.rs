@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use axum::Router;
 use axum::body::Body;
-use axum::extract::{Request, State};
+use axum::extract::{ConnectInfo, Request, State};
 use axum::http::StatusCode;
 use axum::http::header::{CONTENT_LENGTH, CONTENT_TYPE};
 use axum::response::{IntoResponse, Response};
@@ -20,7 +20,8 @@ use tokio::task::JoinHandle;
 use super::{SLOW_TRANSFER, path_of, wrong_bytes};
 use crate::bench::inbox::Reporter;
 use crate::bench::listen::listen_on;
-use crate::bench::patience::PatientListener;
+use crate::bench::patience::{OverTls, PatientListener, SecuredListener};
+use crate::bench::secure::TlsServer;
 use crate::bench::{LinkError, Offer};
 use tck_journal::ServeBehaviour;
 use tck_journal::event::{Direction, Event, Source};
@@ -28,7 +29,8 @@ use tck_journal::event::{Direction, Event, Source};
 /// In how many parts a file is sent.
 const PARTS: usize = 20;
 
-type Offers = Arc<Mutex<HashMap<String, Offer>>>;
+/// Files by whether they are served over TLS, and by their paths.
+type Offers = Arc<Mutex<HashMap<(bool, String), Offer>>>;
 
 /// A running map server.
 pub struct MapServer {
@@ -48,12 +50,17 @@ struct Shared {
 }
 
 impl MapServer {
-    /// Opens the port and serves. Links name `host`, where the device knows this machine by another name than the one
-    /// listened on.
+    /// Opens the port and serves; over TLS as well, where there is a certificate for that. Links name `host`, where the
+    /// device knows this machine by another name than the one listened on.
     ///
     /// # Errors
     /// [`LinkError::Listen`] when the port is taken.
-    pub(crate) async fn start(listen: &str, host: Option<&str>, reporter: Reporter) -> Result<Self, LinkError> {
+    pub(crate) async fn start(
+        listen: &str,
+        host: Option<&str>,
+        tls: Option<TlsServer>,
+        reporter: Reporter,
+    ) -> Result<Self, LinkError> {
         let cannot = |error: io::Error| LinkError::Listen {
             address: listen.to_owned(),
             reason: error.to_string(),
@@ -73,8 +80,13 @@ impl MapServer {
             reporter,
         };
         let router = Router::new().fallback(answer).with_state(shared);
+        let service = router.into_make_service_with_connect_info::<OverTls>();
         let serving = tokio::spawn(async move {
-            if let Err(error) = axum::serve(PatientListener::new(listener), router).await {
+            let ended = match tls {
+                Some(tls) => axum::serve(SecuredListener::beside_plain(listener, tls), service).await,
+                None => axum::serve(PatientListener::new(listener), service).await,
+            };
+            if let Err(error) = ended {
                 tracing::error!(%error, "the map server has ended");
             }
         });
@@ -101,10 +113,11 @@ impl MapServer {
             ServeBehaviour::Unreachable => self.closed.local_addr().unwrap_or(self.address),
             _ => self.address,
         };
+        let scheme = if offer.secured { "https" } else { "http" };
         self.offers
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
-            .insert(path.clone(), offer);
+            .insert((offer.secured, path.clone()), offer);
         let host = match &self.host {
             // An IPv6 address stands in brackets.
             Some(host) if host.contains(':') && !host.starts_with('[') => format!("[{host}]:{}", address.port()),
@@ -114,7 +127,7 @@ impl MapServer {
             None if address.ip().is_unspecified() => format!("[::1]:{}", address.port()),
             None => address.to_string(),
         };
-        format!("http://{host}{path}")
+        format!("{scheme}://{host}{path}")
     }
 
     /// Closes the port.
@@ -170,13 +183,17 @@ impl Drop for Watch {
     }
 }
 
-async fn answer(State(shared): State<Shared>, request: Request) -> Result<Response, Infallible> {
+async fn answer(
+    State(shared): State<Shared>,
+    ConnectInfo(OverTls(secured)): ConnectInfo<OverTls>,
+    request: Request,
+) -> Result<Response, Infallible> {
     let path = request.uri().path().to_owned();
     let offer = shared
         .offers
         .lock()
         .unwrap_or_else(PoisonError::into_inner)
-        .get(&path)
+        .get(&(secured, path.clone()))
         .cloned();
     let mut watch = Watch {
         reporter: shared.reporter,

@@ -443,7 +443,7 @@ fn is_offered(config: &AgvConfig, kind: &ActionKind) -> bool {
         Effect::Trigger => config.has("triggers"),
         Effect::WaitForTrigger => config.has("triggers") == kind.takes_a_list(),
         Effect::StartHibernation | Effect::StopHibernation | Effect::Shutdown => config.has("hibernation"),
-        Effect::UpdateCertificate => config.has("certificates"),
+        Effect::UpdateCertificate => cfg!(feature = "tls") && config.has("certificates"),
         _ => true,
     };
     in_version && !config.without_actions.contains(kind.name)

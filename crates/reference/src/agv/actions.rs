@@ -76,8 +76,10 @@ pub(crate) struct Action {
     pub(crate) result: Option<String>,
     /// When the present stage ends; `None` if something else ends it.
     pub(crate) due: Option<Moment>,
-    /// How many files were asked for.
-    pub(crate) files: usize,
+    /// The parameter that names the file which is being fetched for a certificate.
+    pub(crate) awaits: Option<&'static str>,
+    /// What was fetched for it, by parameter.
+    pub(crate) files: Vec<(&'static str, bytes::Bytes)>,
     /// Status and remaining time when it was held.
     pub(crate) held: Option<(Status, Option<Duration>)>,
 }
@@ -92,7 +94,8 @@ impl Action {
             status: Status::Waiting,
             result: None,
             due: None,
-            files: 0,
+            awaits: None,
+            files: Vec::new(),
             held: None,
         }
     }

@@ -1,34 +1,29 @@
-//! updateCertificate: a certificate with its key is fetched, file by file, and used from then on (section 6.2.3.3).
+//! updateCertificate: a certificate with its key is fetched, file by file, looked into, and used from then on (section
+//! 6.2.3.3).
 //!
 //! The vehicle knows one service, and fetches over TLS only. What fails leaves the certificate in use that there is.
+
+use bytes::Bytes;
 
 use super::Agv;
 use super::action_effect::{Outcome, Problem};
 use super::actions::{Action, Status};
-use super::hook_points::{Event, Permission};
+use super::certificate_set::flaw;
+use super::hook_points::Permission;
 
 /// The one service that the vehicle has a certificate for.
 const SERVICE: &str = "MQTT";
 
+const KEY: &str = "keyDownloadLink";
+const CERTIFICATE: &str = "certificateDownloadLink";
+const AUTHORITY: &str = "certificateAuthorityDownloadLink";
+
 /// The parameters that name a file, in the order in which they are fetched.
-const LINKS: [&str; 3] = [
-    "keyDownloadLink",
-    "certificateDownloadLink",
-    "certificateAuthorityDownloadLink",
-];
+const LINKS: [&str; 3] = [KEY, CERTIFICATE, AUTHORITY];
 
-/// How a key or a certificate begins, in the form in which they are mostly stored.
-const PEM: &[u8] = b"-----BEGIN ";
-
-/// Whether a file looks like a key or a certificate.
-fn is_pem(file: &[u8]) -> bool {
-    file.windows(PEM.len()).any(|part| part == PEM)
-}
-
-/// The links of an updateCertificate action.
-fn links(action: &Action) -> Vec<String> {
-    let links = LINKS.iter().map(|key| action.text(key).to_owned());
-    links.filter(|link| !link.is_empty()).collect()
+/// The parameters of an updateCertificate action that name a file.
+fn named(action: &Action) -> impl Iterator<Item = &'static str> {
+    LINKS.into_iter().filter(|key| !action.text(key).is_empty())
 }
 
 impl Agv {
@@ -40,37 +35,61 @@ impl Agv {
                 "the vehicle has no certificate for this service",
             ));
         }
-        let links = links(action);
-        let plain = |link: &String| !link.starts_with("https://");
-        if links.iter().any(plain) && self.allows(Permission::RefusePlainLink, true) {
+        let plain = |key: &'static str| !action.text(key).starts_with("https://");
+        if named(action).any(plain) && self.allows(Permission::RefusePlainLink, true) {
             return Outcome::Failed(Problem::unable(action, "a certificate is fetched over TLS only"));
         }
         if let Some(action) = self.actions.get_mut(&action.request.id) {
             action.status = Status::Running;
         }
-        self.fetch_next(action, 0)
+        self.fetch_next(action)
     }
 
     /// Asks for the next file of an updateCertificate action, or has them all.
-    fn fetch_next(&mut self, action: &Action, had: usize) -> Outcome {
-        let links = links(action);
-        let Some(url) = links.get(had) else {
-            return Outcome::Done(None);
+    fn fetch_next(&mut self, action: &Action) -> Outcome {
+        let missing = |key: &&'static str| action.files.iter().all(|(had, _)| had != key);
+        let wanted = |key: &&'static str| missing(key) && self.allows(Permission::FetchForCertificate(*key), true);
+        let Some(key) = named(action).find(wanted) else {
+            return self.activated(action);
         };
-        self.ask_for_file(&action.request.id, url);
+        self.ask_for_file(&action.request.id, action.text(key));
         let due = self.moment() + self.config.download_timeout;
         if let Some(action) = self.actions.get_mut(&action.request.id) {
-            action.files = had + 1;
+            action.awaits = Some(key);
             action.due = Some(due);
         }
         Outcome::Open
     }
 
     /// A file of an updateCertificate action is there.
-    pub(crate) fn certificate_file_done(&mut self, action: &Action, file: &[u8]) {
-        self.happens(Event::CertificateFile(is_pem(file)));
-        let outcome = self.fetch_next(action, action.files);
-        let outcome = self.ends(action, outcome);
-        self.conclude(&action.request.id, outcome);
+    pub(crate) fn certificate_file_done(&mut self, id: &str, file: &Bytes) {
+        let Some(action) = self.actions.get_mut(id) else { return };
+        if let Some(key) = action.awaits.take() {
+            action.files.push((key, file.clone()));
+        }
+        let action = action.clone();
+        let outcome = self.fetch_next(&action);
+        let outcome = self.ends(&action, outcome);
+        self.conclude(id, outcome);
+    }
+
+    /// Uses what was fetched from now on, unless something is wrong with it (CERT-02, CERT-04).
+    fn activated(&self, action: &Action) -> Outcome {
+        let file = |wanted| {
+            action
+                .files
+                .iter()
+                .find(|(key, _)| *key == wanted)
+                .map(|(_, file)| file)
+        };
+        let (Some(key), Some(certificate)) = (file(KEY), file(CERTIFICATE)) else {
+            return Outcome::Done(None);
+        };
+        match flaw(key, certificate, file(AUTHORITY), self.now.utc) {
+            Some(flaw) if self.allows(Permission::RefuseCertificate(flaw), true) => {
+                Outcome::Failed(Problem::unable(action, flaw.text()))
+            }
+            _ => Outcome::Done(None),
+        }
     }
 }

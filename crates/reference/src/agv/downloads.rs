@@ -116,7 +116,7 @@ impl Agv {
         }
     }
 
-    fn download_done(&mut self, action_id: &str, file: &[u8]) {
+    fn download_done(&mut self, action_id: &str, file: &bytes::Bytes) {
         let Some(action) = self.actions.get(action_id).cloned() else {
             return;
         };
@@ -125,7 +125,7 @@ impl Agv {
             self.download_failed(action_id, "the file is empty");
         } else if is_certificate {
             self.downloads.forget(action_id);
-            self.certificate_file_done(&action, file);
+            self.certificate_file_done(action_id, file);
         } else if !maps::hash_fits(file, action.text(hash_of(&action))) && self.allows(Permission::CheckHash, true) {
             self.download_failed(action_id, "the file does not have the announced hash");
         } else {

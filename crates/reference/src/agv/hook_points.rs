@@ -6,6 +6,7 @@ use serde_json::{Map, Value};
 
 use super::action_kinds::ActionKind;
 use super::actions::{Action, Origin};
+use super::certificate_set::Flaw;
 use super::errors::ActiveError;
 use super::objections::Objection;
 use super::order_message::{Edge, Node, Order};
@@ -230,6 +231,10 @@ pub(crate) enum Permission<'a> {
     RefuseService,
     /// A certificate is not fetched without TLS (CERT-03).
     RefusePlainLink,
+    /// A file that is named for a certificate is fetched; the parameter (CERT-01).
+    FetchForCertificate(&'static str),
+    /// A certificate is not used that has a flaw (CERT-02, CERT-04).
+    RefuseCertificate(Flaw),
     /// It forgets its last node when it is brought away from it (MODE-14).
     ForgetNode,
     /// An order is refused while it needs help (ERR-04).
@@ -359,8 +364,6 @@ pub(crate) enum Event {
     DownloadRunning,
     /// A file is there; the map is stored next.
     Downloaded,
-    /// A file of an updateCertificate action is there, and whether it looks like a key or a certificate.
-    CertificateFile(bool),
     /// A zone set was taken over.
     ZoneSetStored,
     /// instantActions were read.

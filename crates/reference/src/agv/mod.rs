@@ -18,6 +18,7 @@ pub(crate) mod action_kinds;
 pub(crate) mod actions;
 mod blocking;
 pub(crate) mod cancel;
+pub(crate) mod certificate_set;
 mod certificates;
 mod commands;
 pub(crate) mod config;

@@ -319,7 +319,7 @@ impl<'a> Linter<'a> {
                     self.problems.unknown("unknown-zone", at, "type of zones", name, known);
                 }
             }
-            Need::Zone(None) | Need::Tap | Need::MapServer => {}
+            Need::Zone(None) | Need::Tap | Need::MapServer | Need::SecuredFiles => {}
         }
     }
 

@@ -104,7 +104,7 @@ pub fn variables() -> Vec<Variable> {
             "In a message that is sent: the time so many seconds, or milliseconds (`now.in-500ms`), after it is made.",
         ),
         variable("serve.NAME.url", "Address of the file that `serve: NAME` offers."),
-        variable("serve.NAME.sha256", "Hash of that file."),
+        variable("serve.NAME.sha256", "Hash of that file, unless it belongs to a certificate."),
         variable("vehicle.manufacturer", "Manufacturer of the first mock vehicle (master control under test)."),
         variable("vehicle.serialNumber", "Its serial number."),
         variable("second.manufacturer", "Manufacturer of the second mock vehicle (master control under test)."),

@@ -27,6 +27,8 @@ pub(super) struct Scope<'a> {
     in_test: bool,
     names: BTreeMap<String, Origin>,
     served: Vec<String>,
+    /// Those of them that have no hash.
+    unhashed: Vec<String>,
     /// Names that some step of the test defines, to tell "too early" from "never".
     later: Vec<String>,
     /// Whether every step could be read; otherwise a name may come from one that could not.
@@ -52,6 +54,7 @@ impl<'a> Scope<'a> {
             in_test: true,
             names: BTreeMap::new(),
             served: Vec::new(),
+            unhashed: Vec::new(),
             later,
             complete,
         }
@@ -85,6 +88,9 @@ impl<'a> Scope<'a> {
             && !self.served.contains(&serve.name)
         {
             self.served.push(serve.name.clone());
+            if serve.certificate.is_some() {
+                self.unhashed.push(serve.name.clone());
+            }
         }
         if matches!(*step.verb, Verb::Send(_)) {
             self.define(step, problems);
@@ -222,7 +228,8 @@ impl<'a> Scope<'a> {
     fn served(&self, name: &str, rest: &str, span: &Span) -> Option<Diagnostic> {
         let (offer, member) = rest.split_once('.').unwrap_or((rest, ""));
         if self.served.iter().any(|served| served == offer) {
-            if ["", "url", "sha256"].contains(&member) {
+            let hashed = !self.unhashed.iter().any(|unhashed| unhashed == offer);
+            if ["", "url"].contains(&member) || (member == "sha256" && hashed) {
                 return None;
             }
         } else if self.comes_later(&format!("serve.{offer}")) {

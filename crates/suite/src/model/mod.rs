@@ -6,6 +6,7 @@ mod monitor;
 mod path;
 mod purpose;
 mod schema_cases;
+mod serve;
 mod tags;
 mod vehicle;
 
@@ -163,6 +164,8 @@ pub enum Need {
     Tap,
     /// `maps`: the bench can serve map files to the device.
     MapServer,
+    /// `files over TLS`: the bench can serve files to the device over TLS.
+    SecuredFiles,
     /// `hook NAME`: the profile has a hook of this name.
     Hook(String),
     /// `profile NAME`: the profile says so in `[device]`, such as `stops-between-nodes`,
@@ -182,6 +185,7 @@ pub use monitor::{About, Monitor, Recordings, Rule};
 pub use path::Path;
 pub use purpose::Purpose;
 pub use schema_cases::{Drawn, Kind};
+pub use serve::{CertificateFile, Serve};
 pub use tck_course::CourseNeed;
 pub use tck_journal::ServeBehaviour;
 pub use vehicle::{VehicleStep, Which};
@@ -578,19 +582,6 @@ pub struct Retained {
 pub struct LinkStep {
     /// What is done to the link.
     pub fault: tck_journal::event::LinkFault,
-}
-
-/// `serve:`.
-#[derive(Clone, Debug)]
-pub struct Serve {
-    /// `${serve.NAME}` is the address.
-    pub name: String,
-    /// File of `fixtures/maps/` or of the profile; a built-in map unless said.
-    pub file: Option<Term>,
-    /// A JSON document that is served instead of a file.
-    pub json: Option<Term>,
-    /// How it is served.
-    pub behaviour: ServeBehaviour,
 }
 
 /// `operator:`.

@@ -10,17 +10,19 @@ use tck_journal::ServeBehaviour;
 use tck_journal::event::{Direction, Event, Source};
 
 const BASE: &str = "http://maps.invalid";
+const SECURED: &str = "https://maps.invalid";
 
 impl MemoryLink {
     pub(super) fn offer(&mut self, offer: Offer) -> String {
-        let url = format!("{BASE}{}", maps::path_of(&offer.name));
+        let base = if offer.secured { SECURED } else { BASE };
+        let url = format!("{base}{}", maps::path_of(&offer.name));
         self.offers.insert(url.clone(), offer);
         url
     }
 
     pub(super) fn fetch(&mut self, peer: usize, token: u64, url: &str) {
         let step = 2 * self.options.latency;
-        let path = url.strip_prefix(BASE);
+        let path = url.strip_prefix(BASE).or_else(|| url.strip_prefix(SECURED));
         let Some(offer) = self.offers.get(url).cloned() else {
             if let Some(path) = path {
                 self.fetched(step / 2, "", path, Some(404), "done");

@@ -445,6 +445,7 @@ fn every_way_to_serve_a_file_ends_as_it_should() {
             name: "map 1".to_owned(),
             body: Bytes::from_static(b"file"),
             behaviour,
+            secured: false,
         };
         let url = wait(bench.link.serve(offer)).unwrap();
         bench.link.perform(0, Output::Fetch { token: 7, url });

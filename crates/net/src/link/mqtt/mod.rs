@@ -60,6 +60,7 @@ pub struct MqttLink {
     tap: Option<Tap>,
     maps: MapServer,
     embedded: Option<EmbeddedBroker>,
+    trusted: Vec<std::path::PathBuf>,
     tasks: JoinSet<()>,
     requests: u64,
     probes: u64,
@@ -285,5 +286,9 @@ impl Link for MqttLink {
 
     async fn serve(&mut self, offer: Offer) -> Result<String, LinkError> {
         Ok(self.maps.offer(offer))
+    }
+
+    fn trusted(&self) -> Vec<std::path::PathBuf> {
+        self.trusted.clone()
     }
 }

@@ -42,7 +42,13 @@ impl MqttBench {
             broker: endpoint.clone(),
             embedded: embedded.is_some(),
         };
-        let maps = MapServer::start(&options.maps_listen, options.maps_host.as_deref(), reporter.clone()).await?;
+        let maps = MapServer::start(
+            &options.maps_listen,
+            options.maps_host.as_deref(),
+            tls.clone(),
+            reporter.clone(),
+        )
+        .await?;
         let nodes = nodes(&options)?;
         let (has_own_topics, mut limits) = match self_test(&endpoint, &nodes, &options.own).await? {
             Tested::Keeps(differences) => (true, borne(&differences, &endpoint, &options)?),
@@ -95,7 +101,9 @@ impl MqttBench {
         }
         tasks.spawn(listen(standing.events, endpoint.clone(), probes, reporter.clone()));
         tasks.spawn(watch_lag(reporter.clone()));
+        let shown = options.tls.as_ref().map(|files| files.certificate.clone());
         let link = MqttLink {
+            trusted: options.authority.iter().cloned().chain(shown).collect(),
             clock: options.clock,
             vantage: if options.tap { Vantage::Tap } else { Vantage::Subscriber },
             endpoint,

@@ -2,6 +2,8 @@
 
 mod actions;
 mod cancelling;
+#[cfg(feature = "tls")]
+mod certificates;
 mod curves;
 mod driving;
 mod faulty;

@@ -2,6 +2,7 @@
 
 use super::prelude::*;
 use crate::Output;
+use crate::agv::certificate_set::Flaw;
 use crate::agv::report::Telling;
 
 records! {
@@ -152,13 +153,33 @@ records! {
     fault "any-trigger-will-do" ["ACT-37"] "A button on the vehicle ends what waits for the fleet control alone." because "The text does not say that nothing else may end it."
         => letting(|_, what| matches!(what, Permission::HeedTrigger(action) if action.status == Status::Running));
     fault "certificate-fetched-in-clear" ["CERT-03"] "It fetches key and certificate over plain HTTP, and takes them over."
-        => forbidding(|_, what| matches!(what, Permission::RefusePlainLink));
-    fault "broken-certificate-activated" ["CERT-02", "CERT-01"] "It takes a file over that is no key or certificate, reports updateCertificate FINISHED, and does not come back when its link breaks."
-        => keep::<bool>().happens(|broken, agv, event| match event {
-            Event::CertificateFile(usable) => *broken |= !usable,
-            Event::ConnectionLost if *broken => agv.connection.shut_down = true,
-            _ => {}
+        => forbidding(|_, what| matches!(what, Permission::RefusePlainLink | Permission::RefuseCertificate(Flaw::Unreadable)));
+    fault "certificate-not-downloaded" ["CERT-01"] "It reports updateCertificate FINISHED without having fetched a file."
+        => forbidding(|_, what| matches!(what, Permission::FetchForCertificate(_)));
+    fault "certificate-key-kept" ["CERT-01"] "It fetches a new certificate, and goes on with the key it has."
+        => forbidding(|_, what| matches!(what, Permission::FetchForCertificate("keyDownloadLink")));
+    fault "old-certificate-kept" ["CERT-01"] "It fetches a new key, and goes on with the certificate it has."
+        => forbidding(|_, what| matches!(what, Permission::FetchForCertificate("certificateDownloadLink")));
+    fault "certificate-authority-kept" ["CERT-01"] "It does not fetch the authority that a new certificate comes with." because "The parameter is optional: a warning."
+        => forbidding(|_, what| matches!(what, Permission::FetchForCertificate("certificateAuthorityDownloadLink")));
+    fault "certificate-never-active" ["CERT-01"] "It leaves updateCertificate RUNNING for ever when it has all files."
+        => action(|_, action, m| {
+            if is(action, Effect::UpdateCertificate) && action.status == Status::Finished {
+                m.set("actionStatus", "RUNNING");
+            }
+            true
         });
+    fault "certificate-taken-for-broken" ["CERT-01"] "It fetches a certificate with its key, and reports updateCertificate FAILED however good they are."
+        => after(Effect::UpdateCertificate, |_, action, outcome| match outcome {
+            Outcome::Done(_) => Outcome::Failed(Problem::unable(action, "the certificate cannot be used")),
+            other => other,
+        });
+    fault "broken-certificate-activated" ["CERT-02"] "It takes a file over that is no certificate, and reports updateCertificate FINISHED."
+        => forbidding(|_, what| matches!(what, Permission::RefuseCertificate(Flaw::Unreadable)));
+    fault "other-key-activated" ["CERT-02"] "It takes a key over that does not belong to the certificate, and reports updateCertificate FINISHED."
+        => forbidding(|_, what| matches!(what, Permission::RefuseCertificate(Flaw::OtherKey)));
+    fault "certificate-chain-unchecked" ["CERT-04"] "It takes a certificate over that does not lead to the authority it came with." because "It breaks a recommendation only."
+        => forbidding(|_, what| matches!(what, Permission::RefuseCertificate(Flaw::Stray)));
     tolerance "failed-download-waits-for-a-retry" ["MAP-19", "ZSET-18", "RETRY-02"] "A download that has failed is RETRIABLE until retry or skipRetry comes."
         => keep::<Vec<String>>()
             .ends(|failed, agv, action, outcome| {
