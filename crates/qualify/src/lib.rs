@@ -126,8 +126,8 @@ fn on_duty(library: &Library, pack: &Pack, role: Role) -> impl Iterator<Item = D
 /// The requirements of the earlier versions in which each fault has to be found.
 fn earlier(library: &Library, pack: &Pack, role: Role) -> BTreeSet<String> {
     let rules = &library.rules;
-    let proven = rules.packs.of_role(role).filter(|other| other.finds_every_fault());
-    let before: Vec<_> = proven.filter(|other| other.version < pack.version).collect();
+    let before = rules.packs.of_role(role).take_while(|other| other.id != pack.id);
+    let before: Vec<_> = before.filter(|other| other.finds_every_fault()).collect();
     let all = rules.catalogue.all();
     all.filter(|one| before.iter().any(|other| one.in_version(other).is_some()))
         .map(|one| one.id.to_string())
