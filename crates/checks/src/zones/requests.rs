@@ -10,10 +10,11 @@ use tck_world::{Fact, Listen, Observation, Topic};
 /// `zones/requests`.
 pub(crate) const ZONE_REQUESTS: Check = Check {
     name: "zones/requests",
-    decides: &["ZREQ-03", "ZREQ-05", "ZREQ-06"],
+    decides: &["ZREQ-03", "ZREQ-05", "ZREQ-06", "ZREQ-07"],
     doc: "A zoneRequest that is new is for a zone set that the same state lists as ENABLED (ZREQ-03), and for a zone of that \
           set, where it is known what is in it (ZREQ-06). Its requestType is ACCESS for a zone of type RELEASE, and REPLANNING for \
-          one of type COORDINATED_REPLANNING (ZREQ-05).",
+          one of type COORDINATED_REPLANNING (ZREQ-05). One for a zone of the latter type has a trajectory, and another one than \
+          an undecided request for the same zone (ZREQ-07).",
     arguments: &[],
     listens: &[Listen::ToVehicle(Topic::ZoneSet), Listen::Delivered(Topic::State)],
     reads: &[Fact::Zones],
@@ -80,7 +81,27 @@ fn wrong(request: &ZoneRequest, state: &StateView, context: &CheckContext<'_>) -
         );
         found.push(("ZREQ-05", text));
     }
+    if zone_type == "COORDINATED_REPLANNING" && said == Some("REPLANNING") {
+        found.extend(wrong_way(request, state).map(|text| ("ZREQ-07", text)));
+    }
     found
+}
+
+/// What is wrong with the way of a new request.
+fn wrong_way(request: &ZoneRequest, state: &StateView) -> Option<String> {
+    let id = quote(request.request_id.or_empty());
+    if request.trajectory.is_absent() {
+        return Some(format!("the request {id} for a way through a zone has no trajectory"));
+    }
+    let is_open = |one: &ZoneRequest| one.request_status.is("REQUESTED") || one.request_status.is("QUEUED");
+    let before = state.zone_requests.iter().take(LOOKED_AT);
+    let mut before = before.take_while(|other| !std::ptr::eq(*other, request));
+    let same = before.find(|other| {
+        let of_zone = other.zone_id == request.zone_id && other.zone_set_id == request.zone_set_id;
+        of_zone && is_open(other) && is_open(request) && other.trajectory == request.trajectory
+    })?;
+    let other = quote(same.request_id.or_empty());
+    Some(format!("the requests {other} and {id} are for the same way through a zone"))
 }
 
 impl Running for Requests {

@@ -15,6 +15,7 @@ mod people;
 mod personas;
 mod rejections;
 mod release;
+mod replanning;
 mod requests;
 mod rest;
 mod scenarios;
