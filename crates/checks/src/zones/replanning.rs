@@ -4,6 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use tck_base::nurbs::Path;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
+use tck_journal::event::Event;
+use tck_pack::HookChange;
 use tck_view::{Edge, StateView, ZoneRequest};
 use tck_world::ordered::curve;
 use tck_world::zones::{EXACT, KnownZone, Place};
@@ -199,6 +201,16 @@ fn beside<'a>(ways: impl Iterator<Item = &'a Path>, x: f64, y: f64) -> Option<f6
     all.min_by(f64::total_cmp)
 }
 
+/// Whether somebody may have moved the vehicle, or started it anew.
+fn may_be_moved(record: &Observation<'_>, context: &CheckContext<'_>) -> bool {
+    match record.event() {
+        Event::Hook { hook, .. } => context
+            .hook(hook)
+            .is_none_or(|hook| hook.may_restart() || hook.changes().contains(&HookChange::Position)),
+        _ => record.outside_influence(),
+    }
+}
+
 impl Running for Ways {
     fn observe(
         &mut self,
@@ -208,7 +220,7 @@ impl Running for Ways {
     ) -> bool {
         self.answers.learn(record);
         self.learn(record);
-        if record.outside_influence() || record.connects() || hears_cancel(record) {
+        if may_be_moved(record, context) || record.connects() || hears_cancel(record) {
             self.zones.clear();
         }
         let Some(state) = record.state() else { return false };

@@ -102,7 +102,11 @@ impl Agv {
 
     /// Whether something stands on the edge that the vehicle may not drive round.
     pub(crate) fn is_blocked(&self, edge: &Edge) -> bool {
-        self.obstacles.contains(&edge.id) && (edge.trajectory.is_none() || self.detour(edge).is_none())
+        let rounds = match edge.trajectory {
+            Some(_) => self.detour(edge).is_some(),
+            None => self.granted_bow(edge).is_some(),
+        };
+        self.obstacles.contains(&edge.id) && !rounds
     }
 
     /// Stops and reports when it is outside its corridor (CORR-06, CORR-07); whether it has found that just now.

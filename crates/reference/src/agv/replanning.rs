@@ -3,7 +3,7 @@
 //!
 //! The vehicle plans as far as its base leads through the zone, and waits where it is until that way is granted. What edges
 //! prescribe is the way. On an edge without a trajectory it offers a bow beside the straight line as well, and drives what is
-//! granted first. A base that grows leads on by another way, which is asked for anew; so is the way on when a grant is lost
+//! granted first. What stands on such an edge is driven round in the bow, once that is granted. A base that grows leads on by another way, which is asked for anew; so is the way on when a grant is lost
 //! inside. How requests come and go stands in `zone_requests`.
 
 use serde_json::Value;
@@ -26,11 +26,12 @@ const NEAR: f64 = 0.1;
 /// A way is looked at in steps of so many metres.
 const STEP: f64 = 0.1;
 
-/// How far the bow that it offers leaves the straight line, in metres.
+/// How far the bow that it offers leaves the straight line, in metres, and as a share of the way at most.
 const ASIDE: f64 = 0.5;
+const SHARE: f64 = 0.25;
 
 /// A bow over a shorter way is none, in metres.
-const SHORTEST: f64 = 1.5;
+const SHORTEST: f64 = 0.6;
 
 /// A way through a zone that is asked for.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,8 +132,13 @@ impl Agv {
             bow_of,
         }];
         let room = self.config.plans && bow_of.is_none() && path.length() >= SHORTEST;
-        if let Some(edge) = plain.filter(|_| room && self.allows(Permission::OfferAlternative, true)) {
-            let bow = beside(&path, ASIDE);
+        let is_blocked = |edge: &Edge| self.obstacles.contains(&edge.id);
+        let offers = |edge: &&Edge| room && (is_blocked(edge) || self.allows(Permission::OfferAlternative, true));
+        if let Some(edge) = plain.filter(offers) {
+            if is_blocked(edge) {
+                ways.clear();
+            }
+            let bow = beside(&path, ASIDE.min(SHARE * path.length()));
             let points: Vec<(f64, f64)> = bow.points().collect();
             ways.push(Through {
                 sent: line(&points),
@@ -141,6 +147,22 @@ impl Agv {
             });
         }
         ways
+    }
+
+    /// Where something stands on its edge, awaits the zones in which it may drive round it; whether these are new.
+    pub(crate) fn replans(&mut self, edge: &Edge, stop: &Stop) -> bool {
+        if !self.config.plans || edge.trajectory.is_some() || !self.config.asks_for_zones() {
+            return false;
+        }
+        let pose = self.motion.pose(self.moment());
+        let way = Path::through([(pose.x, pose.y), (stop.place.x, stop.place.y)]);
+        let here = self.zones_in_force(&pose.map_id).into_iter();
+        let met = here.filter(|(_, zone)| {
+            let replanned = zone.kind == ZoneKind::CoordinatedReplanning;
+            replanned && !self.inside_of(zone, &way, &pose.map_id).is_empty()
+        });
+        let names = met.map(|(set, zone)| (set.to_owned(), zone.id.clone())).collect();
+        self.awaits_zones(names)
     }
 
     /// What is left of its base on a map: the ways from node to node, with their edges.
@@ -168,9 +190,12 @@ impl Agv {
     }
 
     /// The bow beside an edge that it was granted.
-    fn granted_bow(&self, edge: &Edge) -> Option<&Path> {
+    pub(crate) fn granted_bow(&self, edge: &Edge) -> Option<&Path> {
         let requests = self.requests.zones.iter();
-        let granted = requests.filter(|request| request.status == RequestStatus::Granted);
+        let granted = requests.filter(|request| {
+            let granted = request.status == RequestStatus::Granted;
+            self.allows(Permission::DriveWay(request), granted)
+        });
         let mut ways = granted.filter_map(|request| request.way.as_ref());
         let bow = ways.find(|way| way.bow_of == Some(edge.sequence_id))?;
         Some(&bow.path)

@@ -162,3 +162,18 @@ fn what_is_taken_back_before_it_went_in_is_asked_for_anew() {
     assert!(place(&mut bench, 3.0).0 < 0.1);
     assert_eq!(statuses(&bench), ["r REQUESTED", "r REQUESTED"]);
 }
+
+#[test]
+fn what_stands_in_the_way_inside_is_driven_round_once_that_is_granted() {
+    let mut bench = before_zones(&["r"], &[]);
+    bench.order(order("o1", 0, 0, "n1 n2"));
+    answer(&mut bench, 0, "GRANTED");
+    while place(&mut bench, 0.1).0 < 1.2 {}
+    bench.command("place-obstacle", json!({ "edgeId": "n1-n2" }));
+    assert_eq!(statuses(&bench), ["r GRANTED", "r REQUESTED"]);
+    assert!(farthest(&mut bench, 3) < 0.01);
+    answer(&mut bench, 1, "GRANTED");
+    assert_eq!(statuses(&bench), ["r GRANTED"]);
+    assert!(farthest(&mut bench, 5) > 0.3);
+    assert_eq!(bench.state()["lastNodeId"], "n2");
+}

@@ -68,6 +68,12 @@ records! {
             let granted = agv.requests.zones.iter().any(|request| request.way.is_some() && request.status == RequestStatus::Granted);
             (!granted).then_some(path)
         });
+    fault "replanning-rounds-unasked" ["ZONE-16"] "In a COORDINATED_REPLANNING zone it drives round what stands in its way without waiting for an answer."
+        => letting(|agv, what| match what {
+            Permission::DriveWay(request) => request.way.as_ref().is_some_and(|way| way.bow_of.is_some()) && !agv.obstacles.is_empty(),
+            Permission::EnterZone(zone) => is_replanning(zone) && is_in(agv, zone) && !agv.obstacles.is_empty(),
+            _ => false,
+        });
     fault "replanning-lost-drives-on" ["ZREQ-15"] "It drives on in a COORDINATED_REPLANNING zone when its grant is lost, and reports it."
         => allowing(|agv, what, usual| match what {
             Permission::StayWithoutRelease(ReleaseLoss::Anew) => false,
