@@ -100,7 +100,8 @@ impl Running for Lines {
                 quote(zone.name())
             );
             let mut here = zones.in_force(now.pose.map_id.as_str());
-            let overrules = here.any(|other| OVERRULED.iter().any(|kind| other.is(kind)) && other.area.touches(&zone.area));
+            let overrules =
+                here.any(|other| OVERRULED.iter().any(|kind| other.is(kind)) && other.area.touches(&zone.area));
             for id in ["ZONE-07"].into_iter().chain(overrules.then_some("ZINT-02")) {
                 findings.push(match beside > 2.0 * BESIDE {
                     true => broken(id, record.seq(), message.clone()),

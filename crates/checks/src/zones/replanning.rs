@@ -20,7 +20,7 @@ pub(crate) const REPLANNING_PATH: Check = Check {
     name: "zones/replanning-path",
     decides: &["ZONE-16"],
     doc: "A vehicle that was clear of a COORDINATED_REPLANNING zone in force, and whose kinematic centre is inside, is on one of \
-          the trajectories that it was granted for that zone, within 0.3 m; up to twice that is a warning. Orders with a corridor, \
+          the trajectories that it was granted for that zone, within 0.3 m; from 0.2 m on it is a warning. Orders with a corridor, \
           within which a trajectory may be left, are not judged, nor is what meets a LINE_GUIDED zone.",
     arguments: &[],
     listens: LISTENS,
@@ -65,6 +65,8 @@ const NEEDS: &[tck_view::Field] = &[
 
 /// How far from a way a vehicle, or another way, may be, in metres.
 const BESIDE: f64 = 0.3;
+/// How far a vehicle may be without a word about it.
+const NEAR: f64 = 0.2;
 /// A trajectory is looked at in steps of so many metres, and so many of them.
 const STEP: f64 = 0.2;
 const STEPS: u32 = 2_000;
@@ -85,7 +87,8 @@ struct Access {
     clear: bool,
     /// What it has asked for since then.
     ways: BTreeMap<String, Path>,
-    told: bool,
+    /// What was said of it: nothing, a warning, a breach.
+    told: u8,
 }
 
 struct Ways {
@@ -121,7 +124,9 @@ impl Ways {
             self.loosened = false;
         }
         for edge in order.edges.iter().take(EDGES) {
-            let Some(sequence_id) = edge.sequence_id.whole() else { continue };
+            let Some(sequence_id) = edge.sequence_id.whole() else {
+                continue;
+            };
             self.loosened |= edge.corridor.presence().is_something();
             self.edges.remove(&sequence_id);
             let path = curve(&edge.trajectory).and_then(|(curve, _)| curve);
@@ -164,8 +169,9 @@ impl Ways {
             Question::Kept => {
                 let granted = access.ways.iter().filter(|(id, _)| self.is_granted(id));
                 let off = beside(granted.map(|(_, way)| way), x, y)? - place.off;
-                let text =
-                    format!("in the {REPLANNING} zone {name} the vehicle is {off:.2} m beside the ways that it was granted");
+                let text = format!(
+                    "in the {REPLANNING} zone {name} the vehicle is {off:.2} m beside the ways that it was granted"
+                );
                 Some((off, text))
             }
             Question::Sent => {
@@ -176,7 +182,9 @@ impl Ways {
                     return None;
                 }
                 let steps = (0..STEPS).map(|step| STEP * f64::from(step));
-                let spots = steps.take_while(|made| *made <= way.length()).filter_map(|made| way.at(made));
+                let spots = steps
+                    .take_while(|made| *made <= way.length())
+                    .filter_map(|made| way.at(made));
                 let inside =
                     spots.filter(|spot| zone.area.depth(tck_base::polygon::Point::new(spot.x, spot.y)) > EXACT);
                 let off = inside.filter_map(|spot| beside(access.ways.values(), spot.x, spot.y));
@@ -237,17 +245,25 @@ impl Running for Ways {
             self.learn_ways(state, zone, zones.reach(zone, place));
             let inside = zones.centre(zone, place).is_some_and(|depth| depth > 0.0);
             let of_order = state.order_id.is(&self.order);
-            if inside && of_order
+            if inside
+                && of_order
                 && let Some((off, text)) = self.look(state, zone, place)
             {
                 judged = true;
                 let access = self.zones.entry(name.clone()).or_default();
-                if off > BESIDE && !std::mem::replace(&mut access.told, true) {
-                    findings.push(match self.question {
-                        Question::Kept if off <= 2.0 * BESIDE => remark("ZONE-16", record.seq(), text),
-                        Question::Kept => broken("ZONE-16", record.seq(), text),
-                        Question::Sent => broken("ZREQ-16", record.seq(), text),
-                    });
+                let finding = match self.question {
+                    Question::Kept if off > BESIDE => Some(broken("ZONE-16", record.seq(), text)),
+                    Question::Kept if off > NEAR => Some(remark("ZONE-16", record.seq(), text)),
+                    Question::Sent if off > BESIDE => Some(broken("ZREQ-16", record.seq(), text)),
+                    _ => None,
+                };
+                // The worse one is said even where the other one was.
+                let weight = finding
+                    .as_ref()
+                    .map_or(0, |finding| if finding.verdict.is_some() { 1 } else { 2 });
+                if weight > access.told {
+                    access.told = weight;
+                    findings.extend(finding);
                 }
             }
             in_force.insert(name);

@@ -25,7 +25,12 @@ fn drive(trace: &mut Trace, places: &[f64], requests: &Value) {
 
 fn way(points: &[(f64, f64)]) -> Value {
     let last = points.len() - 1;
-    let knots: Vec<f64> = [0].into_iter().chain(0..=last).chain([last]).map(|knot| knot as f64 / last as f64).collect();
+    let knots: Vec<f64> = [0]
+        .into_iter()
+        .chain(0..=last)
+        .chain([last])
+        .map(|knot| knot as f64 / last as f64)
+        .collect();
     let points: Vec<Value> = points.iter().map(|(x, y)| json!({ "x": x, "y": y })).collect();
     json!({ "degree": 1, "knotVector": knots, "controlPoints": points })
 }
@@ -59,7 +64,8 @@ fn order(trace: &mut Trace, trajectory: Option<&Value>) {
     if let Some(trajectory) = trajectory {
         edge["trajectory"] = trajectory.clone();
     }
-    let node = |id: &str, sequence: u32| json!({ "nodeId": id, "sequenceId": sequence, "released": true, "actions": [] });
+    let node =
+        |id: &str, sequence: u32| json!({ "nodeId": id, "sequenceId": sequence, "released": true, "actions": [] });
     trace.sent(
         "order",
         &json!({ "orderId": "o", "orderUpdateId": 0, "nodes": [node("a", 0), node("b", 2)], "edges": [edge] }),
@@ -75,7 +81,11 @@ fn through(trace: &mut Trace, way: &Value) {
 #[test]
 fn who_asks_waits_and_keeps_to_the_way_is_not_accused() {
     let mut trace = granted(&straight());
-    for check in ["zones/replanning-asked", "zones/replanning-granted", "zones/replanning-path"] {
+    for check in [
+        "zones/replanning-asked",
+        "zones/replanning-granted",
+        "zones/replanning-path",
+    ] {
         let judged = trace.judge(check);
         assert!(judged.findings.is_empty() && judged.judged > 0, "{check}");
     }
@@ -84,8 +94,14 @@ fn who_asks_waits_and_keeps_to_the_way_is_not_accused() {
 
 #[test]
 fn who_leaves_the_granted_way_is_found() {
-    assert_eq!(granted(&aside(0.5)).judge("zones/replanning-path").summary(), ["ZONE-16 warning"]);
-    assert_eq!(granted(&aside(1.2)).judge("zones/replanning-path").summary(), ["ZONE-16"]);
+    assert_eq!(
+        granted(&aside(0.35)).judge("zones/replanning-path").summary(),
+        ["ZONE-16 warning"]
+    );
+    assert_eq!(
+        granted(&aside(0.5)).judge("zones/replanning-path").summary(),
+        ["ZONE-16"]
+    );
     let mut trace = vehicle(&[("r", ZONE), ("l", "LINE_GUIDED")]);
     order(&mut trace, None);
     through(&mut trace, &aside(1.2));
@@ -95,7 +111,10 @@ fn who_leaves_the_granted_way_is_found() {
 #[test]
 fn who_goes_in_with_nothing_granted_is_found_in_each_zone() {
     let mut trace = vehicle(&[("r", ZONE), ("s", ZONE)]);
-    let both = json!([request("1", "r", "GRANTED", &straight()), request("2", "s", "REQUESTED", &straight())]);
+    let both = json!([
+        request("1", "r", "GRANTED", &straight()),
+        request("2", "s", "REQUESTED", &straight())
+    ]);
     drive(&mut trace, &BEFORE, &both);
     answer(&mut trace, "1", "GRANTED");
     drive(&mut trace, &INSIDE, &both);
@@ -115,7 +134,10 @@ fn what_an_edge_prescribes_is_asked_for() {
         trace.judge("zones/replanning-sent").summary()
     };
     assert!(found(&straight()).is_empty());
-    assert!(found(&way(&[(2.0, 0.0), (4.0, 0.0)])).is_empty(), "the part inside is enough");
+    assert!(
+        found(&way(&[(2.0, 0.0), (4.0, 0.0)])).is_empty(),
+        "the part inside is enough"
+    );
     assert_eq!(found(&aside(0.8)), ["ZREQ-16"]);
     assert_eq!(found(&way(&[(0.0, 0.0), (3.0, 0.0)])), ["ZREQ-16"], "it ends inside");
 }
@@ -133,5 +155,8 @@ fn each_request_has_a_way_of_its_own() {
     assert!(judged(&again("s", "REQUESTED")).is_empty(), "it is another zone");
     assert!(judged(&again("r", "REVOKED")).is_empty(), "it asks anew");
     assert_eq!(judged(&again("r", "QUEUED")), ["ZREQ-07"]);
-    assert_eq!(judged(&json!([merged(first.clone(), &json!({ "trajectory": null }))])), ["ZREQ-07"]);
+    assert_eq!(
+        judged(&json!([merged(first.clone(), &json!({ "trajectory": null }))])),
+        ["ZREQ-07"]
+    );
 }

@@ -101,7 +101,9 @@ fn wrong_way(request: &ZoneRequest, state: &StateView) -> Option<String> {
         of_zone && is_open(other) && is_open(request) && other.trajectory == request.trajectory
     })?;
     let other = quote(same.request_id.or_empty());
-    Some(format!("the requests {other} and {id} are for the same way through a zone"))
+    Some(format!(
+        "the requests {other} and {id} are for the same way through a zone"
+    ))
 }
 
 impl Running for Requests {

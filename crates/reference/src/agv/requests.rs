@@ -421,7 +421,11 @@ impl Agv {
         let new = edge.is_some_and(|edge| self.has_to_ask(edge) && self.requests.way(edge.sequence_id).is_none());
         // It goes on only by a way that was granted, which is looked for where it stands.
         let in_zone = edge.is_some_and(|edge| self.config.plans && self.is_blocked(edge))
-            && self.heeding.inside.iter().any(|(_, zone)| zone.kind == ZoneKind::CoordinatedReplanning);
+            && self
+                .heeding
+                .inside
+                .iter()
+                .any(|(_, zone)| zone.kind == ZoneKind::CoordinatedReplanning);
         if new || in_zone {
             let moment = self.moment();
             self.motion.halt(moment);

@@ -278,9 +278,7 @@ impl Agv {
                 self.errors.left_zone(name, &one.zone.1);
             }
         }
-        let stops = |lost: &LostRelease| {
-            self.allows(Permission::StayWithoutRelease(lost.loss), lost.loss.stops())
-        };
+        let stops = |lost: &LostRelease| self.allows(Permission::StayWithoutRelease(lost.loss), lost.loss.stops());
         let holds = lost.iter().any(stops);
         self.requests.lost = lost;
         let changed = holds != self.holds.access;

@@ -36,7 +36,13 @@ fn requests(bench: &Bench) -> Vec<Value> {
 }
 
 fn statuses(bench: &Bench) -> Vec<String> {
-    let text = |one: &Value| format!("{} {}", one["zoneId"].as_str().unwrap(), one["requestStatus"].as_str().unwrap());
+    let text = |one: &Value| {
+        format!(
+            "{} {}",
+            one["zoneId"].as_str().unwrap(),
+            one["requestStatus"].as_str().unwrap()
+        )
+    };
     requests(bench).iter().map(text).collect()
 }
 
@@ -89,7 +95,10 @@ fn the_way_leads_as_far_as_the_base_and_its_requests_are_gone_behind_the_zone() 
     assert_eq!(statuses(&bench), ["r REQUESTED"]);
     answer(&mut bench, 0, "GRANTED");
     bench.wait(10.0);
-    assert_eq!((bench.state()["lastNodeId"].clone(), requests(&bench).len()), (json!("n3"), 0));
+    assert_eq!(
+        (bench.state()["lastNodeId"].clone(), requests(&bench).len()),
+        (json!("n3"), 0)
+    );
 }
 
 #[test]
@@ -104,7 +113,10 @@ fn a_base_that_grows_inside_leads_on_by_another_way() {
     answer(&mut bench, 1, "GRANTED");
     assert_eq!(statuses(&bench), ["r GRANTED"]);
     bench.wait(5.0);
-    assert_eq!((bench.state()["lastNodeId"].clone(), requests(&bench).len()), (json!("n3"), 0));
+    assert_eq!(
+        (bench.state()["lastNodeId"].clone(), requests(&bench).len()),
+        (json!("n3"), 0)
+    );
 }
 
 #[test]
@@ -141,13 +153,22 @@ fn a_grant_that_is_lost_inside_stops_it_until_another_way_is_granted() {
     while place(&mut bench, 0.1).0 < 1.5 {}
     answer(&mut bench, 0, "REVOKED");
     let (stopped, _) = place(&mut bench, 0.0);
-    assert_eq!((statuses(&bench), bench.error_types()), (vec!["r REVOKED".to_owned()], vec!["lost".to_owned()]));
+    assert_eq!(
+        (statuses(&bench), bench.error_types()),
+        (vec!["r REVOKED".to_owned()], vec!["lost".to_owned()])
+    );
     assert!((place(&mut bench, 3.0).0 - stopped).abs() < 0.1);
     assert_eq!(statuses(&bench)[..2], ["r REVOKED", "r REQUESTED"]);
     answer(&mut bench, 1, "GRANTED");
-    assert_eq!((statuses(&bench), bench.error_types().len()), (vec!["r GRANTED".to_owned()], 0));
+    assert_eq!(
+        (statuses(&bench), bench.error_types().len()),
+        (vec!["r GRANTED".to_owned()], 0)
+    );
     bench.wait(8.0);
-    assert_eq!((bench.state()["lastNodeId"].clone(), requests(&bench).len()), (json!("n3"), 0));
+    assert_eq!(
+        (bench.state()["lastNodeId"].clone(), requests(&bench).len()),
+        (json!("n3"), 0)
+    );
 }
 
 #[test]

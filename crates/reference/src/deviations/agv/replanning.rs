@@ -132,7 +132,10 @@ fn shows(agv: &Agv, zone: &Zone, status: RequestStatus) -> bool {
 fn part_inside(request: &ZoneRequest, zone: &Zone) -> Option<Value> {
     let path = &request.way.as_ref()?.path;
     let steps = (0..400_u32).map(|step| 0.05 * f64::from(step));
-    let spots = steps.take_while(|made| *made <= path.length()).chain([path.length()]).filter_map(|made| path.at(made));
+    let spots = steps
+        .take_while(|made| *made <= path.length())
+        .chain([path.length()])
+        .filter_map(|made| path.at(made));
     let near = |spot: &tck_base::nurbs::Spot| zone.area.depth(tck_base::polygon::Point::new(spot.x, spot.y)) > -0.8;
     let points: Vec<(f64, f64)> = spots.filter(near).map(|spot| (spot.x, spot.y)).collect();
     (points.len() > 1).then(|| crate::agv::paths::line(&points))
