@@ -24,13 +24,9 @@ fn drive(trace: &mut Trace, places: &[f64], requests: &Value) {
 }
 
 fn way(points: &[(f64, f64)]) -> Value {
-    let last = points.len() - 1;
-    let knots: Vec<f64> = [0]
-        .into_iter()
-        .chain(0..=last)
-        .chain([last])
-        .map(|knot| knot as f64 / last as f64)
-        .collect();
+    let last = u32::try_from(points.len() - 1).unwrap();
+    let knots = [0].into_iter().chain(0..=last).chain([last]);
+    let knots: Vec<f64> = knots.map(|knot| f64::from(knot) / f64::from(last)).collect();
     let points: Vec<Value> = points.iter().map(|(x, y)| json!({ "x": x, "y": y })).collect();
     json!({ "degree": 1, "knotVector": knots, "controlPoints": points })
 }
