@@ -225,8 +225,11 @@ records! {
             true
         });
     fault "knots-too-few" ["ORD-MSG-29"] "Leaves the last knot out of the trajectory it reports."
-        => path(|_, _, _, knots| {
-            knots.pop();
+        => edge(|_, _, m| {
+            m.part("trajectory", |path| if let Some(Value::Array(knots)) = path.get_mut("knotVector") {
+                knots.pop();
+            });
+            true
         });
     fault "knots-not-normalized" ["ORD-MSG-29", "STATE-14"] "The knotVector of the reported trajectories runs from 0 to the length of the edge in metres."
         => path(|_, _, points, knots| {

@@ -69,6 +69,8 @@ records! {
         => forbidding(|_, what| matches!(what, Permission::RefuseShutdown));
     fault "refused-shutdown-done" ["SHUT-01"] "It says that shutdown has failed while it has an order, and is off a moment later."
         => failed(Effect::Shutdown, |agv, _| agv.shut_down());
+    fault "offline-on-refused-shutdown" ["SHUT-01"] "It refuses a shutdown while it has an order, and says OFFLINE all the same."
+        => failed(Effect::Shutdown, |agv, _| agv.publish_connection("OFFLINE"));
     fault "shutdown-ends-the-order" ["SHUT-01"] "It refuses to shut down while it has an order, and gives the order up all the same."
         => failed(Effect::Shutdown, |agv, _| agv.give_up_order());
     fault "shutdown-is-a-word" ["SHUT-02"] "It reports shutdown FINISHED and stays where it is."
