@@ -3,11 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use tck_base::nurbs::Path;
+use tck_base::polygon::Point;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_journal::event::Event;
 use tck_pack::HookChange;
 use tck_view::{Edge, StateView, ZoneRequest};
-use tck_world::ordered::curve;
+use tck_world::ordered::{allowed_deviation, curve};
 use tck_world::zones::{EXACT, KnownZone, Place};
 use tck_world::{Fact, Listen, Observation, Topic};
 
@@ -20,8 +21,10 @@ pub(crate) const REPLANNING_PATH: Check = Check {
     name: "zones/replanning-path",
     decides: &["ZONE-16"],
     doc: "A vehicle that was clear of a COORDINATED_REPLANNING zone in force, and whose kinematic centre is inside, is on one of \
-          the trajectories that it was granted for that zone, within 0.3 m; from 0.2 m on it is a warning. Orders with a corridor, \
-          within which a trajectory may be left, are not judged, nor is what meets a LINE_GUIDED zone.",
+          the trajectories that it was granted for that zone, within 0.3 m and what its position may be off; up to twice that is \
+          a warning. A vehicle that drives along another trajectory which it has asked for, or which its order has, is \
+          not on a granted one as soon as the two can be told from each other. Orders with a corridor, within which a trajectory \
+          may be left, are not judged, nor is what meets a LINE_GUIDED zone.",
     arguments: &[],
     listens: LISTENS,
     reads: &[Fact::Zones],
@@ -35,7 +38,8 @@ pub(crate) const REPLANNING_SENT: Check = Check {
     decides: &["ZREQ-16"],
     doc: "When a vehicle drives an edge with a trajectory in a COORDINATED_REPLANNING zone, the trajectories of its requests for that \
           zone lead where the part of that trajectory inside the zone leads, within 0.3 m. Judged where it was clear of the \
-          zone before, where it has sent a trajectory, and where no LINE_GUIDED zone is met.",
+          zone before, where it has sent a trajectory, where no LINE_GUIDED zone is met, and where the order lets it leave \
+          its trajectories neither in a corridor nor at a node.",
     arguments: &[],
     listens: LISTENS,
     reads: &[Fact::Zones],
@@ -63,10 +67,10 @@ const NEEDS: &[tck_view::Field] = &[
     Edge::trajectory,
 ];
 
-/// How far from a way a vehicle, or another way, may be, in metres.
+/// How far from a way a vehicle, or another way, may be, in metres. Twice as far a vehicle is on none of its ways.
 const BESIDE: f64 = 0.3;
-/// How far a vehicle may be without a word about it.
-const NEAR: f64 = 0.2;
+/// How far a vehicle goes on along another way until it is said to drive that, in metres.
+const ALONG: f64 = 0.2;
 /// A trajectory is looked at in steps of so many metres, and so many of them.
 const STEP: f64 = 0.2;
 const STEPS: u32 = 2_000;
@@ -80,15 +84,28 @@ enum Question {
     Sent,
 }
 
+/// What is said of what is seen.
+#[derive(Clone, Copy, Default, PartialEq, PartialOrd)]
+enum Weight {
+    #[default]
+    Nothing,
+    Warning,
+    Breach,
+}
+
 /// What is known of a zone.
 #[derive(Default)]
 struct Access {
     /// The vehicle was clear of it for certain, since nothing was unclear.
     clear: bool,
-    /// What it has asked for since then.
-    ways: BTreeMap<String, Path>,
-    /// What was said of it: nothing, a warning, a breach.
-    told: u8,
+    /// What it has asked for since then, by requestId. A request that changes its way asks for both.
+    ways: Vec<(String, Path)>,
+    /// Where it was first seen on a way that it was not granted, since it was on one that it was.
+    elsewhere: Option<(f64, f64)>,
+    /// With which edge its ways were compared, and how many there were.
+    compared: Option<(u64, usize)>,
+    /// The worst that was said of it.
+    told: Weight,
 }
 
 struct Ways {
@@ -99,6 +116,8 @@ struct Ways {
     edges: BTreeMap<u64, Path>,
     /// An edge has a corridor.
     loosened: bool,
+    /// A node allows to leave the way to it.
+    cuts: bool,
     zones: BTreeMap<Name, Access>,
 }
 
@@ -110,6 +129,7 @@ impl Ways {
             order: String::new(),
             edges: BTreeMap::new(),
             loosened: false,
+            cuts: false,
             zones: BTreeMap::new(),
         }
     }
@@ -122,7 +142,13 @@ impl Ways {
             id.clone_into(&mut self.order);
             self.edges.clear();
             self.loosened = false;
+            self.cuts = false;
         }
+        for access in self.zones.values_mut() {
+            access.compared = None;
+        }
+        let allowed = order.nodes.iter().filter_map(allowed_deviation);
+        self.cuts |= allowed.fold(0.0, f64::max) > BESIDE;
         for edge in order.edges.iter().take(EDGES) {
             let Some(sequence_id) = edge.sequence_id.whole() else {
                 continue;
@@ -143,59 +169,108 @@ impl Ways {
         let listed = requests(state, zone);
         if reach.is_some_and(|reach| reach <= 0.0) {
             let is_listed = |id: &String| listed.iter().any(|request| request.request_id.is(id));
-            access.ways.retain(|id, _| is_listed(id));
+            access.ways.retain(|(id, _)| is_listed(id));
+            access.elsewhere = None;
+            access.compared = None;
             access.clear = true;
         }
         for request in listed {
             let Some(id) = request.request_id.text() else { continue };
-            if access.ways.contains_key(id) || access.ways.len() >= WAYS {
-                continue;
+            if access.ways.len() >= WAYS {
+                break;
             }
             if let Some(curve) = curve(&request.trajectory).and_then(|(curve, _)| curve) {
-                access.ways.insert(id.to_owned(), curve.path());
+                let way = (id.to_owned(), curve.path());
+                if !access.ways.contains(&way) {
+                    access.ways.push(way);
+                }
             }
         }
     }
 
-    /// What is wrong where the vehicle is in a zone, with how many metres it is off; `None` where nothing can be told.
-    fn look(&self, state: &StateView, zone: &KnownZone, place: &Place) -> Option<(f64, String)> {
-        let access = self.zones.get(&(zone.set.clone(), zone.name().to_owned()))?;
-        if !access.clear || self.loosened && self.question == Question::Kept {
-            return None;
-        }
-        let (x, y) = (place.pose.x, place.pose.y);
-        let name = quote(zone.name());
+    /// What is wrong where the vehicle is in a zone, and how much; `None` where nothing can be told.
+    fn look(&mut self, state: &StateView, zone: &KnownZone, place: &Place) -> Option<(Weight, String)> {
+        let name = (zone.set.clone(), zone.name().to_owned());
+        let access = self.zones.get(&name).filter(|access| access.clear && !self.loosened)?;
         match self.question {
             Question::Kept => {
-                let granted = access.ways.iter().filter(|(id, _)| self.is_granted(id));
-                let off = beside(granted.map(|(_, way)| way), x, y)? - place.off;
+                let elsewhere = access.elsewhere;
+                let (off, elsewhere) = self.off_its_way(access, elsewhere, place)?;
                 let text = format!(
-                    "in the {REPLANNING} zone {name} the vehicle is {off:.2} m beside the ways that it was granted"
+                    "in the {REPLANNING} zone {} the vehicle is {off:.2} m beside the ways that it was granted",
+                    quote(zone.name())
                 );
-                Some((off, text))
+                let drives = elsewhere.is_some_and(|(x, y)| (place.pose.x - x).hypot(place.pose.y - y) >= ALONG);
+                self.zones.get_mut(&name)?.elsewhere = elsewhere;
+                Some(match off - place.off {
+                    _ if drives => (Weight::Breach, format!("{text}, and drives another one")),
+                    off if off > 2.0 * BESIDE => (Weight::Breach, text),
+                    off if off > BESIDE => (Weight::Warning, text),
+                    _ => (Weight::Nothing, text),
+                })
             }
             Question::Sent => {
                 let edge = state.last_node_sequence_id.whole()?.checked_add(1)?;
-                let way = self.edges.get(&edge)?;
-                let on_it = beside(std::iter::once(way), x, y)? - place.off <= BESIDE;
-                if !on_it || access.ways.is_empty() || !state.driving.is(true) {
+                let compared = Some((edge, access.ways.len()));
+                if access.compared == compared {
                     return None;
                 }
-                let steps = (0..STEPS).map(|step| STEP * f64::from(step));
-                let spots = steps
-                    .take_while(|made| *made <= way.length())
-                    .filter_map(|made| way.at(made));
-                let inside =
-                    spots.filter(|spot| zone.area.depth(tck_base::polygon::Point::new(spot.x, spot.y)) > EXACT);
-                let off = inside.filter_map(|spot| beside(access.ways.values(), spot.x, spot.y));
-                let off = off.fold(0.0, f64::max);
+                let off = self.off_its_edge(access, edge, state, zone, place)?;
+                self.zones.get_mut(&name)?.compared = compared;
                 let text = format!(
                     "the trajectory of the edge with the sequenceId {edge} leads up to {off:.2} m beside what was asked for in the \
-                     {REPLANNING} zone {name}"
+                     {REPLANNING} zone {}",
+                    quote(zone.name())
                 );
-                Some((off, text))
+                Some(match off > BESIDE {
+                    true => (Weight::Breach, text),
+                    false => (Weight::Nothing, text),
+                })
             }
         }
+    }
+
+    /// How far the vehicle is from the ways that it was granted, and since where it is on another one instead.
+    fn off_its_way(
+        &self,
+        access: &Access,
+        elsewhere: Option<(f64, f64)>,
+        place: &Place,
+    ) -> Option<(f64, Option<(f64, f64)>)> {
+        let (x, y) = (place.pose.x, place.pose.y);
+        let granted = access.ways.iter().filter(|(id, _)| self.is_granted(id));
+        let off = beside(granted.map(|(_, way)| way), x, y)?;
+        let others = access.ways.iter().filter(|(id, _)| !self.is_granted(id));
+        let other = beside(others.map(|(_, way)| way).chain(self.edges.values()), x, y);
+        let is_there = |other: f64| other <= place.off && off - other > BESIDE.max(2.0 * place.off);
+        let elsewhere = match other.is_some_and(is_there) {
+            true => elsewhere.or(Some((x, y))),
+            false => None,
+        };
+        Some((off, elsewhere))
+    }
+
+    /// How far the trajectory of the edge on which the vehicle drives leads beside what it has asked for.
+    fn off_its_edge(
+        &self,
+        access: &Access,
+        edge: u64,
+        state: &StateView,
+        zone: &KnownZone,
+        place: &Place,
+    ) -> Option<f64> {
+        let way = self.edges.get(&edge)?;
+        let on_it = beside(std::iter::once(way), place.pose.x, place.pose.y)? - place.off <= BESIDE;
+        if !on_it || self.cuts || access.ways.is_empty() || !state.driving.is(true) {
+            return None;
+        }
+        let steps = (0..STEPS).map(|step| STEP * f64::from(step));
+        let spots = steps
+            .take_while(|made| *made <= way.length())
+            .filter_map(|made| way.at(made));
+        let inside = spots.filter(|spot| zone.area.depth(Point::new(spot.x, spot.y)) > EXACT);
+        let off = inside.filter_map(|spot| beside(access.ways.iter().map(|(_, way)| way), spot.x, spot.y));
+        Some(off.fold(0.0, f64::max))
     }
 
     fn is_granted(&self, id: &str) -> bool {
@@ -247,23 +322,18 @@ impl Running for Ways {
             let of_order = state.order_id.is(&self.order);
             if inside
                 && of_order
-                && let Some((off, text)) = self.look(state, zone, place)
+                && let Some((weight, text)) = self.look(state, zone, place)
             {
                 judged = true;
                 let access = self.zones.entry(name.clone()).or_default();
-                let finding = match self.question {
-                    Question::Kept if off > BESIDE => Some(broken("ZONE-16", record.seq(), text)),
-                    Question::Kept if off > NEAR => Some(remark("ZONE-16", record.seq(), text)),
-                    Question::Sent if off > BESIDE => Some(broken("ZREQ-16", record.seq(), text)),
-                    _ => None,
-                };
                 // The worse one is said even where the other one was.
-                let weight = finding
-                    .as_ref()
-                    .map_or(0, |finding| if finding.verdict.is_some() { 1 } else { 2 });
                 if weight > access.told {
                     access.told = weight;
-                    findings.extend(finding);
+                    findings.push(match (self.question, weight) {
+                        (Question::Sent, _) => broken("ZREQ-16", record.seq(), text),
+                        (Question::Kept, Weight::Breach) => broken("ZONE-16", record.seq(), text),
+                        (Question::Kept, _) => remark("ZONE-16", record.seq(), text),
+                    });
                 }
             }
             in_force.insert(name);

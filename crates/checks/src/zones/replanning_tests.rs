@@ -56,16 +56,17 @@ fn granted(way: &Value) -> Trace {
 }
 
 fn order(trace: &mut Trace, trajectory: Option<&Value>) {
+    trace.sent("order", &ordered(trajectory));
+}
+
+fn ordered(trajectory: Option<&Value>) -> Value {
     let mut edge = json!({ "edgeId": "e", "sequenceId": 1, "released": true, "startNodeId": "a", "endNodeId": "b", "actions": [] });
     if let Some(trajectory) = trajectory {
         edge["trajectory"] = trajectory.clone();
     }
     let node =
         |id: &str, sequence: u32| json!({ "nodeId": id, "sequenceId": sequence, "released": true, "actions": [] });
-    trace.sent(
-        "order",
-        &json!({ "orderId": "o", "orderUpdateId": 0, "nodes": [node("a", 0), node("b", 2)], "edges": [edge] }),
-    );
+    json!({ "orderId": "o", "orderUpdateId": 0, "nodes": [node("a", 0), node("b", 2)], "edges": [edge] })
 }
 
 fn through(trace: &mut Trace, way: &Value) {
@@ -90,18 +91,48 @@ fn who_asks_waits_and_keeps_to_the_way_is_not_accused() {
 
 #[test]
 fn who_leaves_the_granted_way_is_found() {
-    assert_eq!(
-        granted(&aside(0.35)).judge("zones/replanning-path").summary(),
-        ["ZONE-16 warning"]
-    );
-    assert_eq!(
-        granted(&aside(0.5)).judge("zones/replanning-path").summary(),
-        ["ZONE-16"]
-    );
+    let found = |off: f64| granted(&aside(off)).judge("zones/replanning-path").summary();
+    assert!(found(0.35).is_empty(), "as near as can be asked");
+    assert_eq!(found(0.5), ["ZONE-16 warning"]);
+    assert_eq!(found(0.8), ["ZONE-16"]);
     let mut trace = vehicle(&[("r", ZONE), ("l", "LINE_GUIDED")]);
     order(&mut trace, None);
     through(&mut trace, &aside(1.2));
     assert_eq!(trace.judge("zones/replanning-path").judged, 0, "the line decides");
+}
+
+#[test]
+fn who_drives_another_way_than_the_granted_one_is_found() {
+    let found = |other: &Value| {
+        let mut trace = vehicle(&[("r", ZONE)]);
+        order(&mut trace, None);
+        let asked = |status: &str| request("1", "r", status, &aside(0.5));
+        let other = request("2", "r", "REQUESTED", other);
+        drive(&mut trace, &BEFORE, &json!([asked("REQUESTED"), other]));
+        answer(&mut trace, "1", "GRANTED");
+        drive(&mut trace, &INSIDE, &json!([asked("GRANTED")]));
+        trace.judge("zones/replanning-path").summary()
+    };
+    assert_eq!(found(&straight()), ["ZONE-16 warning", "ZONE-16"]);
+    assert_eq!(found(&aside(0.3)), ["ZONE-16 warning"], "it is on neither");
+    let mut trace = vehicle(&[("r", ZONE)]);
+    order(&mut trace, None);
+    let both = |status: &str| json!([request("1", "r", status, &aside(0.5)), request("1", "r", status, &straight())]);
+    drive(&mut trace, &BEFORE, &both("REQUESTED"));
+    answer(&mut trace, "1", "GRANTED");
+    drive(&mut trace, &INSIDE, &both("GRANTED"));
+    assert!(trace.judge("zones/replanning-path").findings.is_empty(), "it was granted both");
+}
+
+#[test]
+fn what_an_order_lets_leave_its_trajectory_is_not_asked_for() {
+    let mut trace = vehicle(&[("r", ZONE)]);
+    let mut ordered = ordered(Some(&straight()));
+    ordered["nodes"][1]["nodePosition"] =
+        json!({ "x": 6.0, "y": 0.0, "mapId": "hall", "allowedDeviationXY": { "a": 1.0, "b": 1.0, "theta": 0.0 } });
+    trace.sent("order", &ordered);
+    through(&mut trace, &aside(0.8));
+    assert_eq!(trace.judge("zones/replanning-sent").judged, 0);
 }
 
 #[test]
@@ -150,7 +181,7 @@ fn each_request_has_a_way_of_its_own() {
     assert!(judged(&json!([first, request("2", "r", "REQUESTED", &aside(0.5))])).is_empty());
     assert!(judged(&again("s", "REQUESTED")).is_empty(), "it is another zone");
     assert!(judged(&again("r", "REVOKED")).is_empty(), "it asks anew");
-    assert_eq!(judged(&again("r", "QUEUED")), ["ZREQ-07"]);
+    assert_eq!(judged(&again("r", "QUEUED")), ["ZREQ-07 warning"], "it may ask again");
     assert_eq!(
         judged(&json!([merged(first.clone(), &json!({ "trajectory": null }))])),
         ["ZREQ-07"]

@@ -35,7 +35,7 @@ records! {
             m.unset("trajectory");
             true
         });
-    fault "replanning-alternatives-alike" ["ZREQ-07"] "It asks for the same way twice."
+    fault "replanning-alternatives-alike" ["ZREQ-07"] "It asks for the same way twice." because "A robot may ask again before it is answered; a remark."
         => wording(|agv, request, m| {
             let mut others = agv.requests.zones.iter();
             let first = others.find(|other| other.zone == request.zone && other.status.is_open());
@@ -63,7 +63,7 @@ records! {
             Permission::AskForZone => usual && !agv.heeding.inside.iter().any(|(_, zone)| is_replanning(zone)),
             _ => usual,
         });
-    fault "replanning-granted-way-cut" ["ZONE-16"] "It asks for the trajectory of its edge, and drives straight on in the zone."
+    fault "replanning-granted-way-cut" ["ZONE-16"] "It asks for the trajectory of its edge, and drives straight on in the zone." because "Where a curve is cut by less than 0.6 m nobody can tell that another way was planned; a remark."
         => letting(|_, what| matches!(what, Permission::EnterZone(zone) if is_replanning(zone))).bends(|_, agv, _, path| {
             let granted = agv.requests.zones.iter().any(|request| request.way.is_some() && request.status == RequestStatus::Granted);
             (!granted).then_some(path)
@@ -84,9 +84,17 @@ records! {
         => raising(|agv, _, error| error.error_type != agv.config.errors.release_loss);
     fault "replanning-lost-unheeded" ["ZREQ-15"] "It does not heed that its grant is revoked, or its lease runs out, in a COORDINATED_REPLANNING zone."
         => forbidding(|_, what| matches!(what, Permission::HeedZoneLoss(request, _) if request.inside && request.way.is_some()));
+    fault "drives-on-after-lost-replanning-grant" ["ZREQ-15"] "It shows that its grant is lost in a COORDINATED_REPLANNING zone, and drives on by its way, without an error and without another request."
+        => allowing(|agv, what, usual| match what {
+            Permission::StayWithoutRelease(ReleaseLoss::Anew) => false,
+            Permission::EnterZone(zone) => usual || is_replanning(zone) && is_in(agv, zone) && agv.requests.zones.iter().any(ZoneRequest::is_lost),
+            Permission::AskForZone => usual && !agv.requests.lost.iter().any(|lost| lost.loss == ReleaseLoss::Anew),
+            _ => usual,
+        })
+        .raises(|_, agv, _, error| error.error_type != agv.config.errors.release_loss);
     fault "replanning-lost-waits" ["ZREQ-15"] "It waits for its lost grant to come back, and asks for no other one."
         => forbidding(|agv, what| matches!(what, Permission::AskForZone) && agv.requests.lost.iter().any(|lost| lost.loss == ReleaseLoss::Anew));
-    fault "replanning-request-left-behind" ["REQ-15"] "It goes on listing the request for a way through a zone that it has left."
+    fault "replanning-request-left-behind" ["REQ-15"] "It goes on listing the request for a way through a zone that it has left." because "How soon it goes is not said; a remark."
         => letting(|agv, what| match what {
             Permission::KeepZoneRequest(request) => agv.mode.takes_orders() && !agv.order.cancelled && request.inside,
             _ => false,
