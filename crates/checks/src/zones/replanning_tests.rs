@@ -117,11 +117,19 @@ fn who_drives_another_way_than_the_granted_one_is_found() {
     assert_eq!(found(&aside(0.3)), ["ZONE-16 warning"], "it is on neither");
     let mut trace = vehicle(&[("r", ZONE)]);
     order(&mut trace, None);
-    let both = |status: &str| json!([request("1", "r", status, &aside(0.5)), request("1", "r", status, &straight())]);
+    let both = |status: &str| {
+        json!([
+            request("1", "r", status, &aside(0.5)),
+            request("1", "r", status, &straight())
+        ])
+    };
     drive(&mut trace, &BEFORE, &both("REQUESTED"));
     answer(&mut trace, "1", "GRANTED");
     drive(&mut trace, &INSIDE, &both("GRANTED"));
-    assert!(trace.judge("zones/replanning-path").findings.is_empty(), "it was granted both");
+    assert!(
+        trace.judge("zones/replanning-path").findings.is_empty(),
+        "it was granted both"
+    );
 }
 
 #[test]

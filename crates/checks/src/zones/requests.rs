@@ -81,7 +81,10 @@ fn wrong(request: &ZoneRequest, state: &StateView, context: &CheckContext<'_>) -
         );
         found.push(("ZREQ-05", text));
     }
-    if zone_type == "COORDINATED_REPLANNING" && said == Some("REPLANNING") && !request.trajectory.presence().is_something() {
+    if zone_type == "COORDINATED_REPLANNING"
+        && said == Some("REPLANNING")
+        && !request.trajectory.presence().is_something()
+    {
         found.push((
             "ZREQ-07",
             format!("the request {id} for a way through a zone has no trajectory"),
@@ -102,10 +105,7 @@ fn same_way(request: &ZoneRequest, state: &StateView) -> Option<String> {
         let of_zone = other.zone_id == request.zone_id && other.zone_set_id == request.zone_set_id;
         of_zone && is_open(other) && other.trajectory == request.trajectory
     })?;
-    let (other, id) = (
-        quote(same.request_id.or_empty()),
-        quote(request.request_id.or_empty()),
-    );
+    let (other, id) = (quote(same.request_id.or_empty()), quote(request.request_id.or_empty()));
     Some(format!(
         "the requests {other} and {id} are for the same way through a zone"
     ))
