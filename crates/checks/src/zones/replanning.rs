@@ -20,11 +20,12 @@ use crate::finding::{broken, quote, remark};
 pub(crate) const REPLANNING_PATH: Check = Check {
     name: "zones/replanning-path",
     decides: &["ZONE-16"],
-    doc: "A vehicle that was clear of a COORDINATED_REPLANNING zone in force, and whose kinematic centre is inside, is on one of \
-          the trajectories that it was granted for that zone, within 0.3 m and what its position may be off; up to twice that is \
-          a warning. A vehicle that drives along another trajectory which it has asked for, or which its order has, is \
-          not on a granted one as soon as the two can be told from each other. Orders with a corridor, within which a trajectory \
-          may be left, are not judged, nor is what meets a LINE_GUIDED zone.",
+    doc: "A vehicle that was clear of a COORDINATED_REPLANNING zone in force, and reaches into it, is on one of the trajectories \
+          that it was granted for that zone, within 0.3 m and what its position may be off; up to twice that is a warning. Where \
+          its kinematic centre is outside the trajectory may begin or end elsewhere. A vehicle that drives along another \
+          trajectory, which it has asked for or which its order has, is not on a granted one as soon as the two can be told from \
+          each other. Orders with a corridor, within which a trajectory may be left, are not judged, nor is what meets a \
+          LINE_GUIDED zone.",
     arguments: &[],
     listens: LISTENS,
     reads: &[Fact::Zones],
@@ -37,9 +38,9 @@ pub(crate) const REPLANNING_SENT: Check = Check {
     name: "zones/replanning-sent",
     decides: &["ZREQ-16"],
     doc: "When a vehicle drives an edge with a trajectory in a COORDINATED_REPLANNING zone, the trajectories of its requests for that \
-          zone lead where the part of that trajectory inside the zone leads, within 0.3 m. Judged where it was clear of the \
-          zone before, where it has sent a trajectory, where no LINE_GUIDED zone is met, and where the order lets it leave \
-          its trajectories neither in a corridor nor at a node.",
+          zone lead where the part of that trajectory inside the zone leads, within 0.3 m. Judged once it has driven 0.3 m there, \
+          where it was clear of the zone before, where it has sent a trajectory, where no LINE_GUIDED zone is met, and where \
+          the order lets it leave its trajectories neither in a corridor nor at a node.",
     arguments: &[],
     listens: LISTENS,
     reads: &[Fact::Zones],
@@ -69,8 +70,8 @@ const NEEDS: &[tck_view::Field] = &[
 
 /// How far from a way a vehicle, or another way, may be, in metres. Twice as far a vehicle is on none of its ways.
 const BESIDE: f64 = 0.3;
-/// How far a vehicle goes on along another way until it is said to drive that, in metres.
-const ALONG: f64 = 0.2;
+/// How far a vehicle goes on along a way until it is said to drive it, in metres.
+const ALONG: f64 = 0.3;
 /// A trajectory is looked at in steps of so many metres, and so many of them.
 const STEP: f64 = 0.2;
 const STEPS: u32 = 2_000;
@@ -102,6 +103,8 @@ struct Access {
     ways: Vec<(String, Path)>,
     /// Where it was first seen on a way that it was not granted, since it was on one that it was.
     elsewhere: Option<(f64, f64)>,
+    /// The edge on which it is, and where it was first seen on it.
+    begun: Option<(u64, (f64, f64))>,
     /// With which edge its ways were compared, and how many there were.
     compared: Option<(u64, usize)>,
     /// The worst that was said of it.
@@ -171,6 +174,7 @@ impl Ways {
             let is_listed = |id: &String| listed.iter().any(|request| request.request_id.is(id));
             access.ways.retain(|(id, _)| is_listed(id));
             access.elsewhere = None;
+            access.begun = None;
             access.compared = None;
             access.clear = true;
         }
@@ -188,19 +192,24 @@ impl Ways {
         }
     }
 
-    /// What is wrong where the vehicle is in a zone, and how much; `None` where nothing can be told.
-    fn look(&mut self, state: &StateView, zone: &KnownZone, place: &Place) -> Option<(Weight, String)> {
+    /// What is wrong where the vehicle is in a zone, with its kinematic centre or not, and how much; `None` where nothing can be told.
+    fn look(
+        &mut self,
+        state: &StateView,
+        zone: &KnownZone,
+        place: &Place,
+        is_inside: bool,
+    ) -> Option<(Weight, String)> {
         let name = (zone.set.clone(), zone.name().to_owned());
         let access = self.zones.get(&name).filter(|access| access.clear && !self.loosened)?;
         match self.question {
             Question::Kept => {
-                let elsewhere = access.elsewhere;
-                let (off, elsewhere) = self.off_its_way(access, elsewhere, place)?;
+                let (off, elsewhere) = self.off_its_way(access, place, is_inside)?;
                 let text = format!(
                     "in the {REPLANNING} zone {} the vehicle is {off:.2} m beside the ways that it was granted",
                     quote(zone.name())
                 );
-                let drives = elsewhere.is_some_and(|(x, y)| (place.pose.x - x).hypot(place.pose.y - y) >= ALONG);
+                let drives = elsewhere.is_some_and(|begin| has_gone(begin, place));
                 self.zones.get_mut(&name)?.elsewhere = elsewhere;
                 Some(match off - place.off {
                     _ if drives => (Weight::Breach, format!("{text}, and drives another one")),
@@ -211,12 +220,18 @@ impl Ways {
             }
             Question::Sent => {
                 let edge = state.last_node_sequence_id.whole()?.checked_add(1)?;
+                let begun = access.begun.filter(|(last, _)| *last == edge);
+                let (_, begin) = begun.unwrap_or((edge, (place.pose.x, place.pose.y)));
                 let compared = Some((edge, access.ways.len()));
-                if access.compared == compared {
-                    return None;
-                }
-                let off = self.off_its_edge(access, edge, state, zone, place)?;
-                self.zones.get_mut(&name)?.compared = compared;
+                // One that says that it drives may still be about to ask.
+                let off = match access.compared != compared && has_gone(begin, place) {
+                    true => self.off_its_edge(access, edge, state, zone, place),
+                    false => None,
+                };
+                let access = self.zones.get_mut(&name)?;
+                access.begun = Some((edge, begin));
+                let off = off?;
+                access.compared = compared;
                 let text = format!(
                     "the trajectory of the edge with the sequenceId {edge} leads up to {off:.2} m beside what was asked for in the \
                      {REPLANNING} zone {}",
@@ -231,20 +246,18 @@ impl Ways {
     }
 
     /// How far the vehicle is from the ways that it was granted, and since where it is on another one instead.
-    fn off_its_way(
-        &self,
-        access: &Access,
-        elsewhere: Option<(f64, f64)>,
-        place: &Place,
-    ) -> Option<(f64, Option<(f64, f64)>)> {
+    fn off_its_way(&self, access: &Access, place: &Place, is_inside: bool) -> Option<(f64, Option<(f64, f64)>)> {
         let (x, y) = (place.pose.x, place.pose.y);
         let granted = access.ways.iter().filter(|(id, _)| self.is_granted(id));
-        let off = beside(granted.map(|(_, way)| way), x, y)?;
+        let (off, at_end) = nearest(granted.map(|(_, way)| way), x, y)?;
+        if at_end && !is_inside {
+            return None;
+        }
         let others = access.ways.iter().filter(|(id, _)| !self.is_granted(id));
         let other = beside(others.map(|(_, way)| way).chain(self.edges.values()), x, y);
         let is_there = |other: f64| other <= place.off && off - other > BESIDE.max(2.0 * place.off);
         let elsewhere = match other.is_some_and(is_there) {
-            true => elsewhere.or(Some((x, y))),
+            true => access.elsewhere.or(Some((x, y))),
             false => None,
         };
         Some((off, elsewhere))
@@ -278,10 +291,24 @@ impl Ways {
     }
 }
 
+/// Whether a vehicle has driven on since it was at a place.
+fn has_gone((x, y): (f64, f64), place: &Place) -> bool {
+    (place.pose.x - x).hypot(place.pose.y - y) >= ALONG
+}
+
+/// How far a place is beside the nearest of some ways, and whether it is one of its ends that is so near.
+fn nearest<'a>(ways: impl Iterator<Item = &'a Path>, x: f64, y: f64) -> Option<(f64, bool)> {
+    let all = ways.filter_map(|way| {
+        let beside = way.beside(x, y)?;
+        let at_end = beside.made < EXACT || beside.made > way.length() - EXACT;
+        Some((beside.distance, at_end))
+    });
+    all.min_by(|one, other| one.0.total_cmp(&other.0))
+}
+
 /// How far a place is beside the nearest of some ways.
 fn beside<'a>(ways: impl Iterator<Item = &'a Path>, x: f64, y: f64) -> Option<f64> {
-    let all = ways.filter_map(|way| way.beside(x, y)).map(|beside| beside.distance);
-    all.min_by(f64::total_cmp)
+    nearest(ways, x, y).map(|(distance, _)| distance)
 }
 
 /// Whether somebody may have moved the vehicle, or started it anew.
@@ -317,12 +344,14 @@ impl Running for Ways {
         let here = zones.in_force(place.pose.map_id.as_str());
         for zone in here.filter(|zone| zone.is(REPLANNING) && !is_overruled(zones, zone, place)) {
             let name = (zone.set.clone(), zone.name().to_owned());
-            self.learn_ways(state, zone, zones.reach(zone, place));
-            let inside = zones.centre(zone, place).is_some_and(|depth| depth > 0.0);
+            let reach = zones.reach(zone, place);
+            self.learn_ways(state, zone, reach);
+            let is_inside = zones.centre(zone, place).is_some_and(|depth| depth > 0.0);
+            let reaches = is_inside || reach.is_some_and(|reach| reach > 0.0);
             let of_order = state.order_id.is(&self.order);
-            if inside
+            if reaches
                 && of_order
-                && let Some((weight, text)) = self.look(state, zone, place)
+                && let Some((weight, text)) = self.look(state, zone, place, is_inside)
             {
                 judged = true;
                 let access = self.zones.entry(name.clone()).or_default();

@@ -167,7 +167,7 @@ pub(crate) enum Permission<'a> {
     /// It offers another way through a zone beside the best one (ZREQ-07).
     OfferAlternative,
     /// A request for a zone stays in its states when another one for that zone is granted (ZREQ-14).
-    KeepAlternative(&'a ZoneRequest),
+    KeepAlternative,
     /// A request for a zone stays in its states (ZREQ-10).
     KeepZoneRequest(&'a ZoneRequest),
     /// It heeds that the release of a zone is revoked or has expired (ZREQ-11, ZREQ-12, ZREQ-13).

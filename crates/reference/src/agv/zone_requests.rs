@@ -135,7 +135,7 @@ impl Agv {
                 let mut requests = std::mem::take(&mut self.requests.zones);
                 requests.retain(|other| {
                     let stays = other.id == id || other.zone != zone;
-                    self.allows(Permission::KeepAlternative(other), stays)
+                    self.allows(Permission::KeepAlternative, stays)
                 });
                 self.requests.zones = requests;
             }

@@ -45,10 +45,11 @@ records! {
             true
         });
     fault "replanning-alternatives-kept" ["ZREQ-14"] "It goes on listing the other ways when it was granted one."
-        => letting(|_, what| matches!(what, Permission::KeepAlternative(_)));
+        => letting(|_, what| matches!(what, Permission::KeepAlternative));
     fault "replanning-prescribed-way-unsent" ["ZREQ-16"] "It asks for the straight line where its edge has a trajectory, and drives the trajectory."
-        => wording(|_, request, m| {
-            if let Some(way) = request.way.as_ref().filter(|way| way.bow_of.is_none()) {
+        => wording(|agv, request, m| {
+            let prescribed = agv.order.edges.iter().any(|edge| edge.trajectory.is_some());
+            if let Some(way) = request.way.as_ref().filter(|_| prescribed) {
                 let ends = [way.path.at(0.0), way.path.at(way.path.length())];
                 let points: Vec<Value> = ends.iter().flatten().map(|spot| json!({ "x": spot.x, "y": spot.y })).collect();
                 m.set("trajectory", json!({ "degree": 1, "knotVector": [0.0, 0.0, 1.0, 1.0], "controlPoints": points }));
@@ -63,8 +64,8 @@ records! {
             Permission::AskForZone => usual && !agv.heeding.inside.iter().any(|(_, zone)| is_replanning(zone)),
             _ => usual,
         });
-    fault "replanning-granted-way-cut" ["ZONE-16"] "It asks for the trajectory of its edge, and drives straight on in the zone." because "Where a curve is cut by less than 0.6 m nobody can tell that another way was planned; a remark."
-        => letting(|_, what| matches!(what, Permission::EnterZone(zone) if is_replanning(zone))).bends(|_, agv, _, path| {
+    fault "replanning-granted-way-cut" ["ZONE-16"] "It asks for the trajectory of its edge, and drives straight on in the zone."
+        => letting(|agv, what| matches!(what, Permission::EnterZone(zone) if is_replanning(zone) && shows(agv, zone, RequestStatus::Granted))).bends(|_, agv, _, path| {
             let granted = agv.requests.zones.iter().any(|request| request.way.is_some() && request.status == RequestStatus::Granted);
             (!granted).then_some(path)
         });
