@@ -240,6 +240,7 @@ impl ReferenceAgv {
             Vehicle::Free => {
                 this.config.trajectories = true;
                 this.config.plans = true;
+                this.config.zone_types.insert("COORDINATED_REPLANNING".to_owned());
             }
             Vehicle::WithoutLoads => this.without_loads(),
             Vehicle::WithoutMaps => this.without_maps(),

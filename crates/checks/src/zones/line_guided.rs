@@ -14,10 +14,11 @@ use tck_base::nurbs::Path;
 /// `zones/line-guided`.
 pub(crate) const LINE_GUIDED: Check = Check {
     name: "zones/line-guided",
-    decides: &["ZONE-07"],
+    decides: &["ZONE-07", "ZINT-02"],
     doc: "A vehicle whose kinematic centre is inside a LINE_GUIDED zone is on the trajectory of one of the edges of its \
           order, within 0.3 m; up to twice that is a warning. Edges with a corridor, and orders \
-          without any trajectory, for which a vehicle may have its own, are not judged.",
+          without any trajectory, for which a vehicle may have its own, are not judged. Where a PRIORITY, PENALTY, DIRECTED or \
+          COORDINATED_REPLANNING zone lies there as well, it is about ZINT-02, too.",
     arguments: &[],
     listens: &[
         Listen::ToVehicle(Topic::ZoneSet),
@@ -36,6 +37,8 @@ pub(crate) const LINE_GUIDED: Check = Check {
 
 /// How far from its trajectory a vehicle may be, in metres.
 const BESIDE: f64 = 0.3;
+/// The types of zones that it overrules.
+const OVERRULED: [&str; 4] = ["PRIORITY", "PENALTY", "DIRECTED", "COORDINATED_REPLANNING"];
 /// How many edges of an order are kept in mind.
 const EDGES: usize = 128;
 
@@ -96,10 +99,15 @@ impl Running for Lines {
                 "in the LINE_GUIDED zone {} the vehicle is {beside:.2} m beside its trajectory",
                 quote(zone.name())
             );
-            findings.push(match beside > 2.0 * BESIDE {
-                true => broken("ZONE-07", record.seq(), message),
-                false => remark("ZONE-07", record.seq(), message),
-            });
+            let mut here = zones.in_force(now.pose.map_id.as_str());
+            let overrules =
+                here.any(|other| OVERRULED.iter().any(|kind| other.is(kind)) && other.area.touches(&zone.area));
+            for id in ["ZONE-07"].into_iter().chain(overrules.then_some("ZINT-02")) {
+                findings.push(match beside > 2.0 * BESIDE {
+                    true => broken(id, record.seq(), message.clone()),
+                    false => remark(id, record.seq(), message.clone()),
+                });
+            }
         }
         judged
     }

@@ -8,6 +8,9 @@ mod listed;
 mod release;
 #[cfg(test)]
 mod release_tests;
+mod replanning;
+#[cfg(test)]
+mod replanning_tests;
 mod requests;
 mod sets;
 mod speed;
@@ -19,7 +22,8 @@ pub(super) use blocked::BLOCKED;
 pub(super) use directed::DIRECTED;
 pub(super) use line_guided::LINE_GUIDED;
 pub(super) use listed::{ACTIONS_LISTED, REQUESTS_LISTED};
-pub(super) use release::{RELEASE_ASKED, RELEASE_GRANTED, RELEASE_KEPT};
+pub(super) use release::{RELEASE_ASKED, RELEASE_GRANTED, RELEASE_KEPT, REPLANNING_ASKED, REPLANNING_GRANTED};
+pub(super) use replanning::{REPLANNING_PATH, REPLANNING_SENT};
 pub(super) use requests::ZONE_REQUESTS;
 pub(super) use sets::ZONE_SETS;
 pub(super) use speed::SPEED;

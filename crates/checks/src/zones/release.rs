@@ -1,11 +1,12 @@
-//! `zones/release-…`: whether a RELEASE zone is gone into with a release only.
+//! `zones/release-…`, `zones/replanning-asked` and `zones/replanning-granted`: whether a zone that has to be asked for is gone into
+//! with a grant only.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use tck_base::verdict::Verdict;
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_view::{Response, StateView, ZoneRequest};
-use tck_world::zones::{KnownZone, Place};
+use tck_world::zones::{KnownZone, Place, ZonesSeen};
 use tck_world::{Fact, Listen, Observation, Topic};
 
 use super::drives_by_order;
@@ -23,7 +24,7 @@ pub(crate) const RELEASE_ASKED: Check = Check {
     listens: LISTENS,
     reads: READS,
     needs: NEEDS,
-    start: |_| Box::new(Releases::of(Question::Asked)),
+    start: |_| Box::new(Releases::about(RELEASE, Question::Asked)),
 };
 
 /// `zones/release-granted`.
@@ -39,7 +40,7 @@ pub(crate) const RELEASE_GRANTED: Check = Check {
     listens: LISTENS,
     reads: READS,
     needs: NEEDS,
-    start: |_| Box::new(Releases::of(Question::Granted)),
+    start: |_| Box::new(Releases::about(RELEASE, Question::Granted)),
 };
 
 /// `zones/release-kept`.
@@ -53,10 +54,39 @@ pub(crate) const RELEASE_KEPT: Check = Check {
     listens: LISTENS,
     reads: READS,
     needs: NEEDS,
-    start: |_| Box::new(Releases::of(Question::Kept)),
+    start: |_| Box::new(Releases::about(RELEASE, Question::Kept)),
 };
 
-const LISTENS: &[Listen] = &[
+/// `zones/replanning-asked`.
+pub(crate) const REPLANNING_ASKED: Check = Check {
+    name: "zones/replanning-asked",
+    decides: &["ZREQ-01"],
+    doc: "As zones/release-asked, of COORDINATED_REPLANNING zones that meet no LINE_GUIDED one, which would decide in their place.",
+    arguments: &[],
+    listens: LISTENS,
+    reads: READS,
+    needs: NEEDS,
+    start: |_| Box::new(Releases::about(REPLANNING, Question::Asked)),
+};
+
+/// `zones/replanning-granted`.
+pub(crate) const REPLANNING_GRANTED: Check = Check {
+    name: "zones/replanning-granted",
+    decides: &[
+        "ZONE-16", "ZREQ-02", "ZREQ-09", "ZREQ-11", "ZREQ-12", "REQ-07", "REQ-08", "REQ-09", "REQ-14", "REQ-17",
+    ],
+    doc: "As zones/release-granted, of COORDINATED_REPLANNING zones that meet no LINE_GUIDED one. Which way was granted is not looked at.",
+    arguments: &[],
+    listens: LISTENS,
+    reads: READS,
+    needs: NEEDS,
+    start: |_| Box::new(Releases::about(REPLANNING, Question::Granted)),
+};
+
+const RELEASE: &str = "RELEASE";
+pub(super) const REPLANNING: &str = "COORDINATED_REPLANNING";
+
+pub(super) const LISTENS: &[Listen] = &[
     Listen::ToVehicle(Topic::ZoneSet),
     Listen::ToVehicle(Topic::Responses),
     Listen::ToVehicle(Topic::InstantActions),
@@ -79,18 +109,18 @@ const BEHIND: u32 = 3;
 
 /// What the answers to a request said.
 #[derive(Clone, Copy, Debug, Default)]
-struct Given {
-    granted: bool,
+pub(super) struct Given {
+    pub(super) granted: bool,
     /// When the grant ends, or has ended.
     end: Option<jiff::Timestamp>,
 }
 
 /// Answers to requests.
 #[derive(Default)]
-struct Answers(BTreeMap<String, Given>);
+pub(super) struct Answers(pub(super) BTreeMap<String, Given>);
 
 impl Answers {
-    fn learn(&mut self, record: &Observation<'_>) {
+    pub(super) fn learn(&mut self, record: &Observation<'_>) {
         let message = record
             .to_vehicle(Topic::Responses)
             .and_then(|message| message.responses());
@@ -125,7 +155,7 @@ enum Question {
 }
 
 /// A zone, by the id of its set and its own.
-type Name = (String, String);
+pub(super) type Name = (String, String);
 
 /// What is known of the access to a zone.
 #[derive(Default)]
@@ -168,21 +198,36 @@ impl Access {
 }
 
 struct Releases {
+    /// zoneType.
+    zone_type: &'static str,
     question: Question,
     answers: Answers,
     zones: BTreeMap<Name, Access>,
 }
 
 /// The requests of a state for a zone.
-fn requests<'s>(state: &'s StateView, zone: &KnownZone) -> Vec<&'s ZoneRequest> {
+pub(super) fn requests<'s>(state: &'s StateView, zone: &KnownZone) -> Vec<&'s ZoneRequest> {
     let all = state.zone_requests.iter().take(ANSWERS);
     all.filter(|request| request.zone_id.is(zone.name()) && request.zone_set_id.is(&zone.set))
         .collect()
 }
 
+/// Whether another zone decides in its place: a LINE_GUIDED one over one of COORDINATED_REPLANNING (ZINT-02).
+pub(super) fn is_overruled(zones: &ZonesSeen, zone: &KnownZone, place: &Place) -> bool {
+    let mut here = zones.in_force(place.pose.map_id.as_str());
+    zone.is(REPLANNING) && here.any(|other| other.is("LINE_GUIDED") && other.area.touches(&zone.area))
+}
+
+/// Whether the order is called off, and the requests with it.
+pub(super) fn hears_cancel(record: &Observation<'_>) -> bool {
+    let message = record.instant_actions_to_vehicle();
+    message.is_some_and(|message| message.all_actions().any(|action| action.action_type.is("cancelOrder")))
+}
+
 impl Releases {
-    fn of(question: Question) -> Self {
+    fn about(zone_type: &'static str, question: Question) -> Self {
         Self {
+            zone_type,
             question,
             answers: Answers::default(),
             zones: BTreeMap::new(),
@@ -196,12 +241,6 @@ impl Releases {
             access.holds = false;
             access.behind = 0;
         }
-    }
-
-    /// Whether the order is called off, and the requests with it.
-    fn hears_cancel(record: &Observation<'_>) -> bool {
-        let message = record.instant_actions_to_vehicle();
-        message.is_some_and(|message| message.all_actions().any(|action| action.action_type.is("cancelOrder")))
     }
 
     /// Looks at a zone in a state: whether something was judged, and what is wrong.
@@ -223,11 +262,12 @@ impl Releases {
                 verdict,
                 seq: seen.seq,
                 message: format!(
-                    "the vehicle is at x {:.2}, y {:.2}, which is {:.2} m {} the RELEASE zone {}, and {text}",
+                    "the vehicle is at x {:.2}, y {:.2}, which is {:.2} m {} the {} zone {}, and {text}",
                     seen.place.pose.x,
                     seen.place.pose.y,
                     reach.abs(),
                     if reach > 0.0 { "inside" } else { "outside" },
+                    zone.zone.zone_type.or_empty(),
                     quote(zone.name())
                 ),
                 element: None,
@@ -291,7 +331,7 @@ impl Running for Releases {
         findings: &mut Vec<CheckFinding>,
     ) -> bool {
         self.answers.learn(record);
-        if record.outside_influence() || record.connects() || Self::hears_cancel(record) {
+        if record.outside_influence() || record.connects() || hears_cancel(record) {
             self.forget_places();
         }
         let Some(state) = record.state() else { return false };
@@ -308,10 +348,9 @@ impl Running for Releases {
         };
         let mut judged = false;
         let mut in_force = BTreeSet::new();
-        for zone in zones
-            .in_force(place.pose.map_id.as_str())
-            .filter(|zone| zone.is("RELEASE"))
-        {
+        let zone_type = self.zone_type;
+        let here = zones.in_force(place.pose.map_id.as_str());
+        for zone in here.filter(|zone| zone.is(zone_type) && !is_overruled(zones, zone, place)) {
             in_force.insert((zone.set.clone(), zone.name().to_owned()));
             let (looked, found) = self.look(zone, zones.reach(zone, place), &seen);
             judged |= looked;

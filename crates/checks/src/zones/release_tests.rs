@@ -2,8 +2,8 @@ use serde_json::{Value, json};
 
 use crate::trace::Trace;
 
-/// A vehicle of 1.2 m by 0.8 m, and RELEASE zones from 2 to 4 m along its way.
-fn vehicle(zones: &[(&str, &str)]) -> Trace {
+/// A vehicle of 1.2 m by 0.8 m, and zones from 2 to 4 m along its way.
+pub(super) fn vehicle(zones: &[(&str, &str)]) -> Trace {
     let mut trace = Trace::subscriber_of("3.0");
     let corner = |x: f64, y: f64| json!({ "x": x, "y": y });
     let outline = [
@@ -51,7 +51,7 @@ fn drive(trace: &mut Trace, places: &[f64], requests: &Value) {
     }
 }
 
-fn answer(trace: &mut Trace, id: &str, grant: &str) {
+pub(super) fn answer(trace: &mut Trace, id: &str, grant: &str) {
     trace.sent(
         "responses",
         &json!({ "responses": [{ "requestId": id, "grantType": grant }] }),

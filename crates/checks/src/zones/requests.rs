@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::finding::{broken, quote};
+use crate::finding::{broken, quote, remark};
 use tck_check::{Check, CheckContext, CheckFinding, Running};
 use tck_view::{StateView, ZoneRequest};
 use tck_world::{Fact, Listen, Observation, Topic};
@@ -10,10 +10,11 @@ use tck_world::{Fact, Listen, Observation, Topic};
 /// `zones/requests`.
 pub(crate) const ZONE_REQUESTS: Check = Check {
     name: "zones/requests",
-    decides: &["ZREQ-03", "ZREQ-05", "ZREQ-06"],
+    decides: &["ZREQ-03", "ZREQ-05", "ZREQ-06", "ZREQ-07"],
     doc: "A zoneRequest that is new is for a zone set that the same state lists as ENABLED (ZREQ-03), and for a zone of that \
           set, where it is known what is in it (ZREQ-06). Its requestType is ACCESS for a zone of type RELEASE, and REPLANNING for \
-          one of type COORDINATED_REPLANNING (ZREQ-05).",
+          one of type COORDINATED_REPLANNING (ZREQ-05). One for a zone of the latter type has a trajectory; the same one as an \
+          undecided request for the same zone is a warning, since it may be asked again (ZREQ-07).",
     arguments: &[],
     listens: &[Listen::ToVehicle(Topic::ZoneSet), Listen::Delivered(Topic::State)],
     reads: &[Fact::Zones],
@@ -80,7 +81,34 @@ fn wrong(request: &ZoneRequest, state: &StateView, context: &CheckContext<'_>) -
         );
         found.push(("ZREQ-05", text));
     }
+    if zone_type == "COORDINATED_REPLANNING"
+        && said == Some("REPLANNING")
+        && !request.trajectory.presence().is_something()
+    {
+        found.push((
+            "ZREQ-07",
+            format!("the request {id} for a way through a zone has no trajectory"),
+        ));
+    }
     found
+}
+
+/// Says where a new request is for the same way as one before it that is not decided yet.
+fn same_way(request: &ZoneRequest, state: &StateView) -> Option<String> {
+    let is_open = |one: &ZoneRequest| one.request_status.is("REQUESTED") || one.request_status.is("QUEUED");
+    if !request.trajectory.is_there() || !is_open(request) {
+        return None;
+    }
+    let before = state.zone_requests.iter().take(LOOKED_AT);
+    let mut before = before.take_while(|other| !std::ptr::eq(*other, request));
+    let same = before.find(|other| {
+        let of_zone = other.zone_id == request.zone_id && other.zone_set_id == request.zone_set_id;
+        of_zone && is_open(other) && other.trajectory == request.trajectory
+    })?;
+    let (other, id) = (quote(same.request_id.or_empty()), quote(request.request_id.or_empty()));
+    Some(format!(
+        "the requests {other} and {id} are for the same way through a zone"
+    ))
 }
 
 impl Running for Requests {
@@ -97,6 +125,7 @@ impl Running for Requests {
             if now.insert(id.to_owned()) && !self.known.contains(id) {
                 let found = wrong(request, state, context);
                 findings.extend(found.into_iter().map(|(id, text)| broken(id, record.seq(), text)));
+                findings.extend(same_way(request, state).map(|text| remark("ZREQ-07", record.seq(), text)));
             }
         }
         self.known = now;

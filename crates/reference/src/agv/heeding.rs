@@ -117,7 +117,7 @@ impl Agv {
     }
 
     /// Whether it is in a zone at a pose, or nearer to it than this (ZONE-03, ZONE-04).
-    fn is_inside(&self, zone: &Zone, pose: &Pose, near: f64) -> bool {
+    pub(crate) fn is_inside(&self, zone: &Zone, pose: &Pose, near: f64) -> bool {
         if !self.allows(Permission::GoByContour(zone), zone.kind.is_of_contour()) {
             return zone.area.contains(Point::new(pose.x, pose.y));
         }

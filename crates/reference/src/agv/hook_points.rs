@@ -165,6 +165,12 @@ pub(crate) enum Permission<'a> {
     EnterZone(&'a Zone),
     /// It asks for a zone (ZREQ-01).
     AskForZone,
+    /// It drives a way that it has asked for (ZONE-16).
+    DriveWay(&'a ZoneRequest),
+    /// It offers another way through a zone beside the best one (ZREQ-07).
+    OfferAlternative,
+    /// A request for a zone stays in its states when another one for that zone is granted (ZREQ-14).
+    KeepAlternative,
     /// A request for a zone stays in its states (ZREQ-10).
     KeepZoneRequest(&'a ZoneRequest),
     /// It heeds that the release of a zone is revoked or has expired (ZREQ-11, ZREQ-12, ZREQ-13).

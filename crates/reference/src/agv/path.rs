@@ -42,9 +42,12 @@ const PUSHED: f64 = 1.5;
 const POINTS: u32 = 48;
 
 impl Agv {
-    /// The path over the rest of an edge with a trajectory, from where the vehicle is; `None` on a straight edge.
+    /// The path over the rest of an edge with a trajectory, from where the vehicle is; `None` on a straight one.
     pub(crate) fn curve_ahead(&self, edge: &Edge, stop: &Stop) -> Option<Path> {
-        let whole = edge.trajectory.as_ref()?.path.clone();
+        let Some(trajectory) = edge.trajectory.as_ref() else {
+            return self.bow_ahead(edge, stop);
+        };
+        let whole = trajectory.path.clone();
         let pose = self.motion.pose(self.moment());
         // What was granted on the way is driven round from here on.
         let nearest = whole.beside(pose.x, pose.y);
@@ -99,7 +102,11 @@ impl Agv {
 
     /// Whether something stands on the edge that the vehicle may not drive round.
     pub(crate) fn is_blocked(&self, edge: &Edge) -> bool {
-        self.obstacles.contains(&edge.id) && (edge.trajectory.is_none() || self.detour(edge).is_none())
+        let rounds = match edge.trajectory {
+            Some(_) => self.detour(edge).is_some(),
+            None => self.granted_bow(edge).is_some(),
+        };
+        self.obstacles.contains(&edge.id) && !rounds
     }
 
     /// Stops and reports when it is outside its corridor (CORR-06, CORR-07); whether it has found that just now.
@@ -253,7 +260,7 @@ impl Agv {
 }
 
 /// A path that leaves another one by up to so much to the left, and comes back to it.
-fn beside(path: &Path, lateral: f64) -> Path {
+pub(super) fn beside(path: &Path, lateral: f64) -> Path {
     let points = (0..=POINTS).filter_map(|step| {
         let part = f64::from(step) / f64::from(POINTS);
         let spot = path.at(path.length() * part)?;

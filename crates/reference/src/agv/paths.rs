@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use serde_json::{Map, Value, json};
 
+use tck_base::nurbs::Path;
 use tck_view::StateView;
 
 use super::Agv;
@@ -17,7 +18,7 @@ use super::order_message::Edge;
 const NEXT: usize = 3;
 
 /// A point of the way ahead.
-type Point = (f64, f64);
+pub(crate) type Point = (f64, f64);
 
 impl Agv {
     /// Whether the version has paths, so that edges show what was sent and nothing else (STATE-MSG-21).
@@ -45,8 +46,13 @@ impl Agv {
             return None;
         }
         let pose = self.motion.pose(self.moment());
+        let bow = self.order.edge_ahead().zip(base.first());
+        let bow = bow.and_then(|(edge, stop)| self.bow_ahead(edge, stop));
         let places = base.iter().map(|stop| (stop.place.x, stop.place.y));
-        let points = std::iter::once((pose.x, pose.y)).chain(places).collect();
+        let points = std::iter::once((pose.x, pose.y))
+            .chain(bow.iter().flat_map(Path::points))
+            .chain(places)
+            .collect();
         Some((base.iter().map(|stop| stop.node.id.as_str()).collect(), points))
     }
 
@@ -89,8 +95,8 @@ impl Agv {
     }
 }
 
-/// A line through the points, as a NURBS (PATH-03).
-fn planned(ids: &[&str], points: &[Point]) -> Value {
+/// A line through the points, as a NURBS (PATH-03, ZREQ-07).
+pub(crate) fn line(points: &[Point]) -> Value {
     let last = u32::try_from(points.len().saturating_sub(1)).unwrap_or(1).max(1);
     let inner = (0..=last).map(|at| f64::from(at) / f64::from(last));
     let knots: Vec<f64> = std::iter::once(0.0).chain(inner).chain([1.0]).collect();
@@ -98,8 +104,10 @@ fn planned(ids: &[&str], points: &[Point]) -> Value {
         .iter()
         .map(|(x, y)| json!({ "x": x, "y": y, "weight": 1.0 }))
         .collect();
-    json!({
-        "trajectory": { "degree": 1, "knotVector": knots, "controlPoints": points },
-        "traversedNodes": ids,
-    })
+    json!({ "degree": 1, "knotVector": knots, "controlPoints": points })
+}
+
+/// The way to these nodes.
+fn planned(ids: &[&str], points: &[Point]) -> Value {
+    json!({ "trajectory": line(points), "traversedNodes": ids })
 }

@@ -110,7 +110,7 @@ impl Agv {
         let blocked = edge.as_ref().is_some_and(|edge| self.is_blocked(edge));
         let given_up = self.order.unreachable && !self.allows(Permission::TryAgain, false);
         if blocked || given_up || !self.allows(Permission::SetOut(stop), true) {
-            return false;
+            return edge.is_some_and(|edge| blocked && self.replans(&edge, stop));
         }
         let pose = self.motion.pose(self.moment());
         let curve = edge.as_ref().and_then(|edge| self.curve_ahead(edge, stop));

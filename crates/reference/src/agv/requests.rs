@@ -20,6 +20,7 @@ use super::path::ON_PATH;
 use super::progress::ALIGNED;
 use super::read::{Defect, Fields};
 use super::zone_requests::{LostRelease, ZoneName, ZoneRequest};
+use super::zones::ZoneKind;
 use tck_base::clock::Moment;
 use tck_base::nurbs::Path;
 
@@ -413,12 +414,19 @@ impl Agv {
         true
     }
 
-    /// Something has come onto an edge: where its corridor has to be released, the vehicle stops and plans anew.
+    /// Something has come onto an edge: where its corridor has to be released, or its way was, the vehicle stops and plans anew.
     pub(crate) fn sees_obstacle(&mut self, edge_id: &str) {
         let on_edge = self.order.entered && !self.motion.reached && self.requests.back.is_none();
         let edge = self.order.edge_ahead().filter(|edge| on_edge && edge.id == edge_id);
         let new = edge.is_some_and(|edge| self.has_to_ask(edge) && self.requests.way(edge.sequence_id).is_none());
-        if new {
+        // It goes on only by a way that was granted, which is looked for where it stands.
+        let in_zone = edge.is_some_and(|edge| self.config.plans && self.is_blocked(edge))
+            && self
+                .heeding
+                .inside
+                .iter()
+                .any(|(_, zone)| zone.kind == ZoneKind::CoordinatedReplanning);
+        if new || in_zone {
             let moment = self.moment();
             self.motion.halt(moment);
         }

@@ -1,11 +1,12 @@
-//! Access to RELEASE zones: asked for before their border, kept while inside, and what follows when it is lost (sections 6.4.1.1,
-//! 6.4.3 and 6.9).
+//! Requests for RELEASE and COORDINATED_REPLANNING zones: made before their border, kept while inside, and what follows when
+//! what was granted is lost (sections 6.4.1.1, 6.4.3 and 6.9).
 //!
 //! The vehicle asks for the zones on the leg ahead when it sets out, and waits before the border of the first one until
 //! that and all that overlap it are granted. In one in which it is without a grant, such as after somebody has stepped in,
 //! it asks before it drives. A release that is lost inside ends in what the zone says: STOP holds the vehicle until another
 //! request is granted (the ruling of ZONE-12); EVACUATE and CONTINUE let it drive on by its way until it is out, with a
-//! word of its own about that (the ruling of ZREQ-13). Where its order ends inside it waits for another one. With its
+//! word of its own about that (the ruling of ZREQ-13). A way that is lost in a COORDINATED_REPLANNING zone holds it as well, and is
+//! told by that word, since the standard has no other (the ruling of ZREQ-15); which ways it asks for stands in `replanning`. Where its order ends inside it waits for another one. With its
 //! order, and in a mode in which fleet control does not command it, its requests are gone (ORD-CLEAR-08, MODE-08, MODE-16).
 
 use serde_json::{Value, json};
@@ -14,6 +15,7 @@ use super::Agv;
 use super::errors::{ActiveError, Life};
 use super::hook_points::{Cause, Part, Permission};
 use super::motion::{Facing, Pose};
+use super::replanning::Through;
 use super::requests::{Answer, Grant, RequestStatus};
 use super::zones::{ReleaseLoss, Zone, ZoneKind};
 use tck_base::clock::Moment;
@@ -35,6 +37,8 @@ pub(crate) struct ZoneRequest {
     pub(crate) lease: Option<Moment>,
     /// It is in the zone, and was granted it.
     pub(crate) inside: bool,
+    /// The way through the zone, of a request for one.
+    pub(crate) way: Option<Through>,
 }
 
 impl ZoneRequest {
@@ -54,7 +58,7 @@ pub(crate) struct LostRelease {
 impl Agv {
     /// The zones on a way that it has no access to yet, and how far it may go before the first of them.
     pub(crate) fn releases_ahead(&self, way: &Path, facing: Facing, map_id: &str) -> (Vec<ZoneName>, Option<f64>) {
-        let Some(begin) = way.at(0.0).filter(|_| self.config.heeds("RELEASE")) else {
+        let Some(begin) = way.at(0.0).filter(|_| self.config.asks_for_zones()) else {
             return (Vec::new(), None);
         };
         let pose = Pose {
@@ -69,16 +73,24 @@ impl Agv {
         let changes = changes.into_iter().filter(|change| change.enters);
         let met: Vec<(f64, &str, &Zone)> = within
             .chain(changes.map(|change| (change.at, change.set, change.zone)))
-            .filter(|(_, _, zone)| matches!(zone.kind, ZoneKind::Release(_)))
+            .filter(|(_, _, zone)| matches!(zone.kind, ZoneKind::Release(_) | ZoneKind::CoordinatedReplanning))
             .collect();
+        let has_access = |set: &str, zone: &Zone| match zone.kind {
+            ZoneKind::CoordinatedReplanning => self.has_way(set, zone, way, map_id),
+            _ => self.has_access(set, zone),
+        };
         let closed: Vec<&(f64, &str, &Zone)> = met
             .iter()
-            .filter(|(_, set, zone)| !self.allows(Permission::EnterZone(zone), self.has_access(set, zone)))
+            .filter(|(_, set, zone)| !self.allows(Permission::EnterZone(zone), has_access(set, zone)))
             .collect();
         let is_barred = |one: &&(f64, &str, &Zone)| closed.iter().any(|other| one.2.area.touches(&other.2.area));
-        let free = met.iter().find(is_barred).map(|(at, ..)| (at - BEFORE).max(0.0));
+        let free = met.iter().find(is_barred).map(|(at, _, zone)| match zone.kind {
+            // It may be granted another way from where it is.
+            ZoneKind::CoordinatedReplanning => 0.0,
+            _ => (at - BEFORE).max(0.0),
+        });
         let mut wanted: Vec<ZoneName> = Vec::new();
-        for (_, set, zone) in met.iter().filter(|(_, set, zone)| !self.has_access(set, zone)) {
+        for (_, set, zone) in met.iter().filter(|(_, set, zone)| !has_access(set, zone)) {
             let name = ((*set).to_owned(), zone.id.clone());
             if !wanted.contains(&name) {
                 wanted.push(name);
@@ -87,7 +99,7 @@ impl Agv {
         (wanted, free)
     }
 
-    /// Whether a zone may be gone into, or through (ZONE-10). What was lost inside is left as the zone says.
+    /// Whether a RELEASE zone may be gone into, or through (ZONE-10). What was lost inside is left as the zone says.
     fn has_access(&self, set: &str, zone: &Zone) -> bool {
         let mut requests = self.requests.of_zone(set, &zone.id);
         requests.any(|request| request.status == RequestStatus::Granted || request.inside && request.is_lost())
@@ -101,7 +113,7 @@ impl Agv {
     }
 
     /// A zone of this name, as long as it is in force.
-    fn zone_of(&self, name: &ZoneName) -> Option<&Zone> {
+    pub(crate) fn zone_of(&self, name: &ZoneName) -> Option<&Zone> {
         let set = self.zone_sets.get(&name.0)?;
         let applies = self.allows(Permission::ApplyZoneSet(set), set.enabled);
         set.zones.iter().find(|zone| applies && zone.id == name.1)
@@ -120,7 +132,12 @@ impl Agv {
                 request.status = RequestStatus::Granted;
                 request.lease = answer.lease;
                 let (id, zone) = (request.id.clone(), request.zone.clone());
-                self.requests.zones.retain(|other| other.id == id || other.zone != zone);
+                let mut requests = std::mem::take(&mut self.requests.zones);
+                requests.retain(|other| {
+                    let stays = other.id == id || other.zone != zone;
+                    self.allows(Permission::KeepAlternative, stays)
+                });
+                self.requests.zones = requests;
             }
             Grant::Queued if status.is_open() => request.status = RequestStatus::Queued,
             Grant::Rejected if status.is_open() => self.withdraw_zone(&answer.request_id),
@@ -136,7 +153,7 @@ impl Agv {
         self.asks_later();
     }
 
-    /// A release is lost: before the zone the request ends (ZREQ-11, ZREQ-12), inside it stays (ZREQ-13).
+    /// What was granted is lost: before the zone the request ends (ZREQ-11, ZREQ-12), inside it stays (ZREQ-13).
     fn lose_zone(&mut self, id: &str, status: RequestStatus) {
         let Some(at) = self.requests.zones.iter().position(|request| request.id == id) else {
             return;
@@ -164,7 +181,7 @@ impl Agv {
             error_type: self.loss_name(loss),
             fatal: false,
             references: vec![("zoneId".into(), zone.1.clone())],
-            description: "the release of the zone it is in is lost".into(),
+            description: "what was granted for the zone it is in is lost".into(),
             life: Life::WhileInZone,
         };
         self.raise(Cause::Zone, error);
@@ -182,11 +199,12 @@ impl Agv {
         }
     }
 
-    /// What follows when the release of a zone is lost: STOP where it does not say (ZONE-13).
+    /// What follows when the release of a zone is lost: STOP where it does not say (ZONE-13). A way is asked for anew.
     fn loss_of(&self, name: &ZoneName) -> ReleaseLoss {
         let zone = self.zone_of(name);
         match zone.map(|zone| &zone.kind) {
             Some(ZoneKind::Release(Some(loss))) => *loss,
+            Some(ZoneKind::CoordinatedReplanning) => ReleaseLoss::Anew,
             _ if self.allows(Permission::StopUnsaid, true) => ReleaseLoss::Stop,
             _ => ReleaseLoss::Continue,
         }
@@ -260,12 +278,7 @@ impl Agv {
                 self.errors.left_zone(name, &one.zone.1);
             }
         }
-        let stops = |lost: &LostRelease| {
-            self.allows(
-                Permission::StayWithoutRelease(lost.loss),
-                lost.loss == ReleaseLoss::Stop,
-            )
-        };
+        let stops = |lost: &LostRelease| self.allows(Permission::StayWithoutRelease(lost.loss), lost.loss.stops());
         let holds = lost.iter().any(stops);
         self.requests.lost = lost;
         let changed = holds != self.holds.access;
@@ -275,46 +288,65 @@ impl Agv {
         changed || !over.is_empty()
     }
 
-    /// Asks for the zones it waits for, and for those in which it has lost its release (ZREQ-01, ZREQ-04).
+    /// Asks for the zones it waits for, and for those in which it has lost its release or its way (ZREQ-01, ZREQ-04).
     fn ask_for_zones(&mut self) {
         if !self.asks_now() {
             return;
         }
-        let stopped = self.requests.lost.iter().filter(|lost| lost.loss == ReleaseLoss::Stop);
+        let stopped = self.requests.lost.iter().filter(|lost| lost.loss.stops());
         let wanted: Vec<ZoneName> = stopped
             .map(|lost| lost.zone.clone())
             .chain(self.requests.awaited.iter().cloned())
             .collect();
-        for zone in wanted {
-            let asked = self
-                .requests
-                .of_zone(&zone.0, &zone.1)
-                .any(|request| !request.is_lost());
-            if asked || self.zone_of(&zone).is_none() || !self.allows(Permission::AskForZone, true) {
+        for name in wanted {
+            let ways = self.wanted_of(&name);
+            if ways.is_empty() || !self.allows(Permission::AskForZone, true) {
                 continue;
             }
-            let id = self.new_request_id();
-            self.requests.zones.push(ZoneRequest {
-                id,
-                zone,
-                status: RequestStatus::Requested,
-                lease: None,
-                inside: false,
-            });
+            for way in ways {
+                let id = self.new_request_id();
+                self.requests.zones.push(ZoneRequest {
+                    id,
+                    zone: name.clone(),
+                    status: RequestStatus::Requested,
+                    lease: None,
+                    inside: false,
+                    way,
+                });
+            }
         }
     }
 
-    /// zoneRequests (ZREQ-06).
+    /// What it asks for about a zone: a way each, or access.
+    fn wanted_of(&self, name: &ZoneName) -> Vec<Option<Through>> {
+        let Some(zone) = self.zone_of(name) else {
+            return Vec::new();
+        };
+        if zone.kind == ZoneKind::CoordinatedReplanning {
+            let ways = self.ways_to_ask_for(name, zone);
+            return ways.into_iter().map(Some).collect();
+        }
+        let mut requests = self.requests.of_zone(&name.0, &name.1);
+        match requests.any(|request| !request.is_lost()) {
+            true => Vec::new(),
+            false => vec![None],
+        }
+    }
+
+    /// zoneRequests (ZREQ-06, ZREQ-07).
     pub(crate) fn zone_requests(&self) -> Value {
         let all = self.requests.zones.iter();
         all.filter_map(|request| {
-            let picture = json!({
+            let mut picture = json!({
                 "requestId": request.id,
-                "requestType": "ACCESS",
+                "requestType": if request.way.is_some() { "REPLANNING" } else { "ACCESS" },
                 "zoneId": request.zone.1,
                 "zoneSetId": request.zone.0,
                 "requestStatus": request.status.literal(),
             });
+            if let Some(way) = &request.way {
+                picture["trajectory"] = way.sent.clone();
+            }
             self.said(Part::ZoneRequest(request), picture)
         })
         .collect()

@@ -22,12 +22,21 @@ pub const ZONE_TYPES: [&str; 9] = [
     "BIDIRECTED",
 ];
 
-/// What a vehicle does when it loses the release of the zone it is in.
+/// What a vehicle does when it loses what it was granted for the zone it is in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ReleaseLoss {
     Stop,
     Continue,
     Evacuate,
+    /// It stops, and asks for a way anew; no RELEASE zone says so.
+    Anew,
+}
+
+impl ReleaseLoss {
+    /// Whether it stops until something is granted again.
+    pub(crate) fn stops(self) -> bool {
+        matches!(self, Self::Stop | Self::Anew)
+    }
 }
 
 /// How strictly a direction of travel holds.

@@ -17,6 +17,7 @@ mod people;
 mod personas;
 mod rejections;
 mod release;
+mod replanning;
 mod requests;
 mod rest;
 mod scenarios;

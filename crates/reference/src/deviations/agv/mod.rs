@@ -37,6 +37,7 @@ mod prelude;
 mod reading;
 mod refusals;
 mod release;
+mod replanning;
 mod requests;
 mod route;
 mod running;
@@ -86,6 +87,7 @@ const RECORDS: Records<dyn Deviation> = Records(&[
     driving::RECORDS,
     requests::RECORDS,
     release::RECORDS,
+    replanning::RECORDS,
     running::RECORDS,
     pause::RECORDS,
     instants::RECORDS,

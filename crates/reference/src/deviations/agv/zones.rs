@@ -229,6 +229,14 @@ records! {
             let guided = zones.into_iter().any(|zone| zone.kind == ZoneKind::LineGuided);
             (!guided).then_some(path)
         });
+    fault "line-guided-zones-cut-for-others" ["ZINT-02"] "Does not follow trajectories in LINE_GUIDED zones where a PRIORITY, PENALTY or DIRECTED zone lies as well." because "Up to 0.6 m beside the trajectory is a remark, and tests have no room for more."
+        => plain().bends(|_, agv, _, path| {
+            let zones = agv.zone_sets.all.iter().filter(|set| set.enabled).flat_map(|set| &set.zones);
+            let zones: Vec<&ZoneKind> = zones.map(|zone| &zone.kind).collect();
+            let other = |kind: &ZoneKind| matches!(kind, ZoneKind::Priority(_) | ZoneKind::Penalty(_) | ZoneKind::Directed(..));
+            let cuts = zones.contains(&&ZoneKind::LineGuided) && zones.iter().any(|kind| other(kind));
+            (!cuts).then_some(path)
+        });
     fault "zone-action-conflict-unseen" ["ZINT-03"] "Does what a zone asks for although that breaks the rule of a LINE_GUIDED zone."
         => forbidding(|_, what| matches!(what, Permission::SeeConflict));
     fault "zone-action-conflict-silent" ["ZINT-03"] "Stops for actions of zones that conflict, and reports no error."
