@@ -282,7 +282,7 @@ impl Paths {
 }
 
 /// The curve of a plannedPath; `None` where it has none.
-fn curve_of(path: &PlannedPath) -> Option<(Option<tck_base::nurbs::Curve>, Vec<Flaw>)> {
+pub(crate) fn curve_of(path: &PlannedPath) -> Option<(Option<tck_base::nurbs::Curve>, Vec<Flaw>)> {
     let trajectory = path.trajectory.there()?;
     curve(&tck_view::Member::There(Box::new(trajectory.clone())))
 }

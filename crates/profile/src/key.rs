@@ -106,6 +106,14 @@ pub const STATEMENTS: &[Statement] = &[
         doc: "The vehicle plans its own way between two nodes.",
     },
     Statement {
+        name: "straight-lines",
+        doc: "Over an edge without a trajectory the vehicle drives on a line that leads straight from node to node.",
+    },
+    Statement {
+        name: "permanently-powered",
+        doc: "The vehicle gets its power all the time, so that there is no charge that could fall.",
+    },
+    Statement {
         name: "carries-load",
         doc: "The vehicle carries loads, and one may be put on it during the run.",
     },
@@ -343,6 +351,8 @@ pub const KEYS: &[Key] = &[
     key("device.instant-actions", Kind::Flag),
     key("device.line-guided", Kind::Flag),
     key("device.free-navigation", Kind::Flag),
+    key("device.straight-lines", Kind::Flag),
+    key("device.permanently-powered", Kind::Flag),
     key("device.carries-load", Kind::Flag),
     key("device.map-hash", Kind::Flag),
     key("device.small-map-storage", Kind::Flag),

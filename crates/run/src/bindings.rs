@@ -105,6 +105,10 @@ pub(super) fn course_of(
         &named(test, "${course.", ".zone}"),
         judge.ground().factsheet().as_deref(),
     )?;
+    zones::put_across(&mut course, &named(test, "${course.", ".across}"));
+    for part in zones::PARTS {
+        zones::put_part(&mut course, &named(test, "${course.", &format!(".{part}}}")), part)?;
+    }
     Ok(Some(flat(course)))
 }
 

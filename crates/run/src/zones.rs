@@ -1,5 +1,5 @@
 //! Where the zones of a test lie: round a node of its course, or along an edge of it, as large as the vehicle and the nodes beside
-//! it leave room for.
+//! it leave room for; or on the middle of an edge, and beside it, where the kinematic centre alone counts.
 
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
@@ -28,6 +28,22 @@ const APART: f64 = 0.15;
 
 /// The size of a vehicle that does not say how large it is, from its centre, in metres.
 const UNSAID: f64 = 1.0;
+
+/// What the zones on and beside an edge are called: on its middle, and to the left and to the right of that.
+pub(super) const PARTS: [&str; 3] = ["middle", "left", "right"];
+
+/// Half the width of the zone on the middle of an edge, in metres.
+const MIDDLE: f64 = 0.2;
+
+/// How far the zones beside an edge reach, in metres: as far as `room-beside-edges` of a profile promises.
+const BESIDE: f64 = 1.0;
+
+/// The shares of the length of an edge where the zone on its middle begins and ends, and those beside it.
+const MIDDLE_PART: (f64, f64) = (0.25, 0.75);
+const BESIDE_PART: (f64, f64) = (0.2, 0.8);
+
+/// An edge that is shorter is too short for that, in metres.
+const SHORTEST: f64 = 1.5;
 
 /// Corners of a zone round a node.
 const CORNERS: u32 = 8;
@@ -119,6 +135,72 @@ pub(super) fn put(
     Ok(())
 }
 
+/// The corners of one of [`PARTS`] of an edge, counter-clockwise.
+fn part(course: &Value, name: &str, part: &str) -> Option<Vec<Point>> {
+    let (from, to) = name.split_once('-')?;
+    let (from, to) = (place(course, from)?, place(course, to)?);
+    let length = from.distance(to);
+    if length < SHORTEST {
+        return None;
+    }
+    let ((begin, end), (right, left)) = match part {
+        "middle" => (MIDDLE_PART, (-MIDDLE, MIDDLE)),
+        "left" => (BESIDE_PART, (MIDDLE, BESIDE)),
+        _ => (BESIDE_PART, (-BESIDE, -MIDDLE)),
+    };
+    let (along, aside) = (
+        (to.x - from.x, to.y - from.y),
+        ((from.y - to.y) / length, (to.x - from.x) / length),
+    );
+    let corner = |made: f64, off: f64| {
+        Point::new(
+            from.x + along.0 * made + aside.0 * off,
+            from.y + along.1 * made + aside.1 * off,
+        )
+    };
+    Some(vec![
+        corner(begin, right),
+        corner(end, right),
+        corner(end, left),
+        corner(begin, left),
+    ])
+}
+
+/// Gives these edges of a course the corners of a zone on or beside them, under the name of the part.
+///
+/// # Errors
+/// When an edge is too short.
+pub(super) fn put_part(course: &mut Value, names: &BTreeSet<String>, name_of_part: &str) -> Result<(), Reason> {
+    for name in names {
+        let Some(corners) = part(course, name, name_of_part) else {
+            let why =
+                format!("an edge of the course is shorter than {SHORTEST} m, which is too short to lead round a zone");
+            return Err(Reason::observed(why));
+        };
+        let corners = corners
+            .iter()
+            .map(|corner| json!({ "x": round(corner.x), "y": round(corner.y) }));
+        if let Some(Value::Object(members)) = course.get_mut(EDGES).and_then(|edges| edges.get_mut(name)) {
+            members.insert(name_of_part.to_owned(), corners.collect());
+        }
+    }
+    Ok(())
+}
+
+/// Gives these edges of a course the direction across them, to the left, in radians.
+pub(super) fn put_across(course: &mut Value, names: &BTreeSet<String>) {
+    for name in names {
+        let ends = name.split_once('-');
+        let ends = ends.and_then(|(from, to)| place(course, from).zip(place(course, to)));
+        let Some((from, to)) = ends else { continue };
+        let heading = (to.y - from.y).atan2(to.x - from.x);
+        let across = (heading + PI / 2.0 + PI).rem_euclid(2.0 * PI) - PI;
+        if let Some(Value::Object(members)) = course.get_mut(EDGES).and_then(|edges| edges.get_mut(name)) {
+            members.insert("across".to_owned(), across.into());
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -149,6 +231,21 @@ mod tests {
         assert!(about.contains(Point::new(2.0, 0.0)) && !about.contains(Point::new(1.4, 0.0)));
         let along = Polygon::read(&course["edges"]["b-c"]["zone"]).unwrap();
         assert!(along.contains(Point::new(4.2, 0.1)) && !along.contains(Point::new(1.4, 0.0)));
+    }
+
+    #[test]
+    fn the_middle_of_an_edge_and_what_lies_beside_it_do_not_overlap() {
+        let areas = PARTS.map(|name| {
+            let mut course = course();
+            put_part(&mut course, &BTreeSet::from(["a-b".to_owned()]), name).unwrap();
+            Polygon::read(&course["edges"]["a-b"][name]).unwrap()
+        });
+        let holds = |point: Point| areas.iter().map(|area| area.contains(point)).collect::<Vec<bool>>();
+        assert_eq!(holds(Point::new(1.0, 0.0)), [true, false, false]);
+        assert_eq!(holds(Point::new(1.0, 0.5)), [false, true, false]);
+        assert_eq!(holds(Point::new(1.0, -0.5)), [false, false, true]);
+        assert_eq!(holds(Point::new(0.1, 0.0)), [false, false, false]);
+        assert!(areas.iter().all(Polygon::is_counter_clockwise));
     }
 
     #[test]

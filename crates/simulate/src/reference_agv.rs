@@ -260,8 +260,9 @@ impl ReferenceAgv {
         self.config.branches = Some(self.layout.edges().filter_map(branch).collect());
     }
 
-    /// It carries nothing, charges nowhere, and offers no action that needs a station.
+    /// It carries nothing, gets its power from the floor, and offers no action that needs a station.
     fn without_loads(&mut self) {
+        self.config.permanently_powered = true;
         self.config
             .zone_types
             .retain(|kind| matches!(kind.as_str(), "BLOCKED" | "SPEED_LIMIT"));
@@ -314,6 +315,8 @@ impl ReferenceAgv {
             ("map-hash", true),
             ("line-guided", self.config.branches.is_some()),
             ("free-navigation", self.config.plans),
+            ("straight-lines", !self.config.plans && self.config.branches.is_none()),
+            ("permanently-powered", self.config.permanently_powered),
             ("room-beside-edges", true),
             ("zones-on-course", self.config.branches.is_none()),
         ]

@@ -45,6 +45,17 @@ fn a_vehicle_on_the_curve_is_right_and_one_on_the_straight_line_is_not() {
     on_edge(&json!({ "trajectory": { "degree": 3 } }), &[(2.0, 3.0, 0.0)]).not_judged(FOLLOWED);
 }
 
+const OWN_WAY: &str = "motion/trajectory-disregarded";
+
+#[test]
+fn a_way_of_its_own_is_one_that_is_nowhere_on_the_curve() {
+    let edge = json!({ "trajectory": bow() });
+    on_edge(&edge, &[(1.0, 0.8, 0.5), (2.0, 1.1, 0.0)]).right(OWN_WAY);
+    on_edge(&edge, &[(2.0, 0.0, 0.0)]).wrong(OWN_WAY, &["ORD-18 warning"]);
+    on_edge(&edge, &[(1.5, 0.0, 0.0), (2.0, 0.0, 0.0)]).wrong(OWN_WAY, &["ORD-18 warning", "ORD-18"]);
+    on_edge(&edge, &[(2.0, 1.0, 0.0), (2.5, 0.0, 0.0), (3.0, 0.0, 0.0)]).wrong(OWN_WAY, &["ORD-18 warning"]);
+}
+
 const ORIENTATION: &str = "motion/curve-orientation";
 
 #[test]

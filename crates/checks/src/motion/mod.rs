@@ -4,12 +4,14 @@
 //! may have done between measuring and reporting. What the tests must demand is left to them.
 
 mod axes;
+mod back_on_edge;
 mod corridor;
 mod corridor_release;
 mod curve;
 mod edge_orientation;
 mod edge_rotation_speed;
 mod edge_speed;
+mod followed;
 mod mode_speed;
 mod node_theta;
 mod node_tolerance;
@@ -17,6 +19,7 @@ mod rotation_place;
 mod velocity_sign;
 
 pub(super) use axes::AXES;
+pub(super) use back_on_edge::BACK_ON_EDGE;
 pub(super) use corridor::{CORRIDOR, CORRIDOR_POINT, NEXT_CORRIDOR};
 pub(super) use corridor_release::{
     CORRIDOR_ASKED, CORRIDOR_GRANTED, CORRIDOR_KEPT, CORRIDOR_LEASE, CORRIDOR_RETURNED, CORRIDOR_SHOWN,
@@ -25,6 +28,7 @@ pub(super) use curve::{CURVE_ORIENTATION, TRAJECTORY};
 pub(super) use edge_orientation::EDGE_ORIENTATION;
 pub(super) use edge_rotation_speed::EDGE_ROTATION_SPEED;
 pub(super) use edge_speed::EDGE_SPEED;
+pub(super) use followed::FOLLOWED;
 pub(super) use mode_speed::MODE_SPEED;
 pub(super) use node_theta::NODE_THETA;
 pub(super) use node_tolerance::NODE_TOLERANCE;

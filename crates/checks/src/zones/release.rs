@@ -57,6 +57,20 @@ pub(crate) const RELEASE_KEPT: Check = Check {
     start: |_| Box::new(Releases::about(RELEASE, Question::Kept)),
 };
 
+/// `zones/release-contour`.
+pub(crate) const RELEASE_CONTOUR: Check = Check {
+    name: "zones/release-contour",
+    decides: &["ZONE-03"],
+    doc: "A vehicle whose factsheet draws its outline waits before a RELEASE zone with all of it. One that reaches in with a part of \
+          its outline and without a grant is a warning, and a failure when its kinematic centre is inside as well. What is \
+          nearer to the border than the vehicle says to be exact, or than 0.1 m, is not judged.",
+    arguments: &[],
+    listens: LISTENS,
+    reads: READS,
+    needs: NEEDS,
+    start: |_| Box::new(Releases::about(RELEASE, Question::Contour)),
+};
+
 /// `zones/replanning-asked`.
 pub(crate) const REPLANNING_ASKED: Check = Check {
     name: "zones/replanning-asked",
@@ -152,6 +166,7 @@ enum Question {
     Asked,
     Granted,
     Kept,
+    Contour,
 }
 
 /// A zone, by the id of its set and its own.
@@ -244,7 +259,12 @@ impl Releases {
     }
 
     /// Looks at a zone in a state: whether something was judged, and what is wrong.
-    fn look(&mut self, zone: &KnownZone, reach: Option<f64>, seen: &Seen<'_>) -> (bool, Option<CheckFinding>) {
+    fn look(
+        &mut self,
+        zone: &KnownZone,
+        (reach, centre): (Option<f64>, Option<f64>),
+        seen: &Seen<'_>,
+    ) -> (bool, Option<CheckFinding>) {
         let listed = requests(seen.state, zone);
         let name = (zone.set.clone(), zone.name().to_owned());
         let access = self.zones.entry(name).or_default();
@@ -281,6 +301,15 @@ impl Releases {
             }
             Question::Granted if entered && !granted => {
                 found = Some(finding("no response gives it access", None));
+            }
+            Question::Contour => {
+                let waits = !granted && !access.ids.is_empty() && seen.state.driving.is(false);
+                judged = seen.outlined && (access.clear.is_some() && reach.is_none() && waits || entered && !granted);
+                if judged && entered {
+                    let all = centre.is_some_and(|depth| depth > 0.0);
+                    let softer = (!all).then_some(Verdict::Warning);
+                    found = Some(finding("its outline counts where no response gives it access", softer));
+                }
             }
             Question::Kept => {
                 access.holds |= entered && granted;
@@ -321,6 +350,8 @@ struct Seen<'s> {
     place: &'s Place,
     seq: u64,
     now: jiff::Timestamp,
+    /// The outline of the vehicle is known.
+    outlined: bool,
 }
 
 impl Running for Releases {
@@ -345,6 +376,7 @@ impl Running for Releases {
             place,
             seq: record.seq(),
             now: record.at().utc,
+            outlined: zones.knows_outline(),
         };
         let mut judged = false;
         let mut in_force = BTreeSet::new();
@@ -352,7 +384,8 @@ impl Running for Releases {
         let here = zones.in_force(place.pose.map_id.as_str());
         for zone in here.filter(|zone| zone.is(zone_type) && !is_overruled(zones, zone, place)) {
             in_force.insert((zone.set.clone(), zone.name().to_owned()));
-            let (looked, found) = self.look(zone, zones.reach(zone, place), &seen);
+            let depths = (zones.reach(zone, place), zones.centre(zone, place));
+            let (looked, found) = self.look(zone, depths, &seen);
             judged |= looked;
             findings.extend(found);
         }

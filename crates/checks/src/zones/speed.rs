@@ -11,9 +11,9 @@ use tck_world::{Fact, Listen, Observation, Topic};
 /// `zones/speed`.
 pub(crate) const SPEED: Check = Check {
     name: "zones/speed",
-    decides: &["ZONE-17", "ZINT-04", "ZINT-08"],
+    decides: &["ZONE-17", "ZINT-04", "ZINT-08", "ZINT-09"],
     doc: "The velocity of a vehicle whose outline reaches into a SPEED_LIMIT zone is not above its maximumSpeed, by more \
-          than a tenth and 0.05 m/s; of several zones the lowest counts. What is nearer to the border than the vehicle says \
+          than a tenth and 0.05 m/s; of several zones the lowest counts, and one counts inside a RELEASE zone as well. What is nearer to the border than the vehicle says \
           to be exact, or than 0.1 m, is not judged.",
     arguments: &[],
     listens: &[
@@ -75,6 +75,13 @@ impl Running for Speed {
                 .any(|zone| zones.centre(zone, place).is_some_and(|depth| depth < 0.0))
             {
                 findings.push(broken("ZINT-08", record.seq(), message.clone()));
+            }
+            let released = zones
+                .in_force(place.pose.map_id.as_str())
+                .filter(|zone| zone.is("RELEASE"));
+            let mut released = released.filter_map(|zone| zones.reach(zone, place));
+            if released.any(|reach| reach > 0.0) {
+                findings.push(broken("ZINT-09", record.seq(), message.clone()));
             }
             if limits.len() > 1 {
                 findings.push(broken("ZINT-04", record.seq(), message));

@@ -148,6 +148,23 @@ fn travel_against_a_direction_is_found_and_travel_along_it_is_not() {
     assert_eq!(driven(&json!([across])), ["ZONE-23"]);
 }
 
+#[test]
+fn the_outline_counts_at_the_border_of_a_zone() {
+    let blocked = json!([zone("BLOCKED", &json!({}))]);
+    let seen = |places: &[(f64, f64)]| driven("zones/contour", &blocked, places);
+    assert!(seen(&[(0.0, 1.0), (0.5, 1.0), (1.3, 1.0), (1.38, 0.0)]).is_empty());
+    assert_eq!(
+        seen(&[(0.0, 1.0), (0.5, 1.0), (1.0, 1.0), (1.7, 1.0)]),
+        ["ZONE-03 warning"]
+    );
+    assert_eq!(seen(&[(0.0, 1.0), (0.5, 1.0), (1.0, 1.0), (3.0, 1.0)]), ["ZONE-03"]);
+    let slow = json!([zone("SPEED_LIMIT", &json!({ "maximumSpeed": 0.5 }))]);
+    let seen = |places: &[(f64, f64)]| driven("zones/contour", &slow, places);
+    assert!(seen(&[(0.0, 2.0), (0.5, 2.0), (1.7, 0.5), (4.3, 0.5), (5.0, 2.0)]).is_empty());
+    assert_eq!(seen(&[(0.0, 2.0), (1.0, 2.0), (1.7, 2.0)]), ["ZONE-03 warning"]);
+    assert_eq!(seen(&[(0.0, 2.0), (1.0, 2.0), (3.0, 2.0)]), ["ZONE-03"]);
+}
+
 fn sets(states: &[Value], before: impl Fn(&mut Trace, usize)) -> Vec<String> {
     let mut trace = Trace::subscriber_of(SPEC);
     for (index, sets) in states.iter().enumerate() {

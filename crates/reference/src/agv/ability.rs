@@ -16,6 +16,9 @@ use super::{Agv, motion};
 /// How far an edge orientation may be from forwards or backwards, in radians: the vehicle has two driven wheels.
 const SIDEWAYS: f64 = 0.1;
 
+/// No floor of a layout reaches so far beyond its nodes, in metres.
+const OFF_THE_FLOOR: f64 = 1_000.0;
+
 /// Slowest controlled speed, in metres or radians per second.
 pub(crate) const SLOWEST: f64 = 0.01;
 
@@ -62,9 +65,16 @@ impl Agv {
             let Some(place) = self.place(node) else {
                 let path = format!("{}.nodePosition", node.path);
                 let refusal = Refusal::at_field(Rule::Unable, "the vehicle does not know where the node is", &path);
-                return Err(refusal.naming("nodeId", &node.id));
+                let refusal = refusal.naming("nodeId", &node.id);
+                return Err(match self.config.has("unreachableRefused") {
+                    true => refusal.because(Detail::NoRoute),
+                    false => refusal,
+                });
             };
             self.check_map(node, &place, (index, update))?;
+            if index > 0 {
+                self.check_reach(node, &place)?;
+            }
         }
         for (index, edge) in order.edges.iter().enumerate() {
             let ends = order.nodes.get(index).zip(order.nodes.get(index + 1));
@@ -117,6 +127,22 @@ impl Agv {
             )?;
         }
         Ok(())
+    }
+
+    /// A node that lies far off the floor that the vehicle knows cannot be reached (ORD-REJ-22).
+    fn check_reach(&self, node: &Node, place: &Place) -> Result<(), Refusal> {
+        if !self.config.has("unreachableRefused") {
+            return Ok(());
+        }
+        let known = self.config.nodes.iter().filter(|known| known.map_id == place.map_id);
+        let mut distances = known
+            .map(|known| (known.x - place.x).hypot(known.y - place.y))
+            .peekable();
+        if distances.peek().is_none() || distances.any(|distance| distance < OFF_THE_FLOOR) {
+            return Ok(());
+        }
+        let refusal = Refusal::new(Rule::Unable, "a node is out of reach").naming("nodeId", &node.id);
+        self.object(Objection::Unreachable, refusal.because(Detail::NoRoute))
     }
 
     fn check_edge(&self, edge: &Edge, ends: Option<(&Node, &Node)>) -> Result<(), Refusal> {

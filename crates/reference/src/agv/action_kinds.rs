@@ -472,7 +472,10 @@ pub(crate) fn refusal(
         }
     }
     if strict {
-        let known = |key: &str| kind.parameters.iter().any(|parameter| parameter.key == key);
+        // The version itself has this one, and no factsheet lists it.
+        let named = kind.effect == Effect::CancelOrder && config.has("cancelByOrderId");
+        let known =
+            |key: &str| kind.parameters.iter().any(|parameter| parameter.key == key) || named && key == "orderId";
         if let Some((key, _)) = request.parameters.iter().find(|(key, _)| !known(key)) {
             return Some((key.clone(), "parameter is unknown"));
         }

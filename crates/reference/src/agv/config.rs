@@ -92,6 +92,8 @@ pub struct ErrorNames {
     pub not_available: String,
     /// The vehicle cannot tell where it is (STATE-MSG-19).
     pub lost: String,
+    /// An order with a node that cannot be reached.
+    pub no_route: String,
     /// A map that is on board is to be downloaded (MAP-23).
     pub duplicate_map: String,
     /// A zone set is on board already (ZSET-13).
@@ -181,6 +183,7 @@ impl Default for ErrorNames {
             release_loss: name("zoneReleaseError"),
             node_unreachable: name("noRouteError"),
             lost: name("localizationError"),
+            no_route: name("noRouteError"),
         }
     }
 }
@@ -216,6 +219,7 @@ impl ErrorNames {
             (&mut names.release_lost, "error.releaseLost"),
             (&mut names.node_unreachable, "error.nodeUnreachable"),
             (&mut names.lost, "error.localization"),
+            (&mut names.no_route, "error.noRoute"),
         ];
         for (name, path) in entries {
             if let Some(word) = word(path) {
@@ -296,6 +300,8 @@ pub struct AgvConfig {
     pub trajectories: bool,
     /// Whether it plans its path itself, and reports it (STATE-14).
     pub plans: bool,
+    /// Whether it gets its power from the floor all the time.
+    pub permanently_powered: bool,
     /// Whether it follows a line on the floor, knows places by their names only, and takes the branch it is told
     /// (ORD-MSG-27): start node, direction and end node of every branch.
     pub branches: Option<Vec<(String, String, String)>>,
@@ -393,6 +399,7 @@ impl Default for AgvConfig {
             stops_between_nodes: true,
             trajectories: false,
             plans: false,
+            permanently_powered: false,
             branches: None,
             chargers,
             stations,

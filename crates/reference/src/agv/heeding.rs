@@ -46,7 +46,7 @@ pub(crate) type OfSet = (String, Zone);
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Heeding {
     /// The sets in force when it looked last.
-    applied: Vec<String>,
+    pub(crate) applied: Vec<String>,
     /// The zones it is in.
     pub(crate) inside: Vec<OfSet>,
     /// Zones whose actions would break the rule of another one.
@@ -179,7 +179,7 @@ impl Agv {
     }
 
     /// Whether a zone may not be gone into, or through, in a direction on an edge.
-    fn bars(&self, zone: &Zone, heading: f64, edge: Option<&Edge>) -> bool {
+    pub(crate) fn bars(&self, zone: &Zone, heading: f64, edge: Option<&Edge>) -> bool {
         let curved = edge.is_some_and(|edge| edge.trajectory.is_some());
         let off = |direction: f64| wrapped(heading - direction).abs();
         let barred = match &zone.kind {

@@ -141,6 +141,8 @@ pub(crate) enum Permission<'a> {
     TakeInstant,
     /// An instant action is taken that fits its kind (ACT-10).
     Fit(&'a ActionKind),
+    /// A parameter that the factsheet does not list for an instant action is heeded (OPT-06).
+    HeedUnlisted,
     /// An instant action that cannot be performed is refused (IACT-06).
     RefuseInstant(&'a Action),
     /// An instant action begins at once (IACT-05).

@@ -82,7 +82,8 @@ impl Agv {
             (Some(defect), _) => Some(format!("{} {}", defect.path, defect.reason)),
             (None, None) => Some("the vehicle does not offer the action as an instant action".to_owned()),
             (None, Some(kind)) => {
-                let found = action_kinds::refusal(kind, &request, &self.config, false);
+                let strict = self.allows(Permission::HeedUnlisted, self.config.has("unlistedRefused"));
+                let found = action_kinds::refusal(kind, &request, &self.config, strict);
                 found.map(|(key, reason)| format!("{key}: {reason}"))
             }
         };

@@ -3,7 +3,7 @@
 //! A message goes through it like this: `connection` receives nothing and sends everything; a driver hands in what came
 //! ([`Device::handle`]), and takes out what is to be sent. An order is read by `read` and `order_message`, decided in
 //! `acceptance` (figure 8), with `updates` for what continues an order, `ability` for what the vehicle can do and
-//! `rejection` for how it says no. `order_state` holds the order, `progress` drives it, leg by leg as `way` and `path` plan them,
+//! `rejection` for how it says no. `order_state` holds the order, `progress` drives it, leg by leg as `way`, `path` and `planner` plan them,
 //! and `cancel` ends it (figure 9); `requests` asks for corridors that have to be released, `zone_requests` for zones, and `replanning` for ways through them. `actions` knows when an action runs, `blocking` what may run beside it, `action_effect`,
 //! `stations`, `maps`, `zone_sets` and `downloads` what it does. `instant` takes instant actions, `commands` what people do to the
 //! vehicle, `heeding` what it does about zones. `report` says all that in states, `factsheet` what the vehicle is.
@@ -39,6 +39,7 @@ pub(crate) mod order_message;
 pub(crate) mod order_state;
 pub(crate) mod path;
 pub(crate) mod paths;
+mod planner;
 pub(crate) mod progress;
 pub(crate) mod read;
 pub(crate) mod rejection;

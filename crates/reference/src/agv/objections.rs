@@ -41,6 +41,8 @@ pub(crate) enum Objection<'a> {
     Map(&'a Node, usize, bool),
     /// The map of a node is not enabled; the same (MAP-13).
     DisabledMap(&'a Node, usize, bool),
+    /// A node lies far off the floor (ORD-REJ-22).
+    Unreachable,
     /// An edge is too low (ORD-MSG-21).
     Height,
     /// An edge cannot be driven with that orientation (ORD-REJ-16).

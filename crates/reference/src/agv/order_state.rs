@@ -5,6 +5,7 @@
 use std::collections::VecDeque;
 
 use super::order_message::{Edge, Node};
+use super::planner::Bow;
 
 /// Place of a node.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,6 +55,8 @@ pub(crate) struct OrderState {
     pub(crate) zoned: bool,
     /// Its next node turned out to be out of reach.
     pub(crate) unreachable: bool,
+    /// How it drives the edge ahead, where it plans its way itself and zones weigh on it.
+    pub(crate) bow: Option<Bow>,
     /// What the last message of it said.
     pub(crate) content: (Vec<Node>, Vec<Edge>),
     /// lastNodeId and lastNodeSequenceId before the present ones.
@@ -77,6 +80,7 @@ impl OrderState {
             cancelled: false,
             zoned: false,
             unreachable: false,
+            bow: None,
             content: (Vec::new(), Vec::new()),
             previous: (String::new(), 0),
         }

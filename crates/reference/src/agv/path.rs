@@ -42,12 +42,16 @@ const PUSHED: f64 = 1.5;
 const POINTS: u32 = 48;
 
 impl Agv {
-    /// The path over the rest of an edge with a trajectory, from where the vehicle is; `None` on a straight one.
+    /// The path over the rest of an edge with a trajectory, or on which it goes another way, from where the vehicle is; `None` on a
+    /// straight edge.
     pub(crate) fn curve_ahead(&self, edge: &Edge, stop: &Stop) -> Option<Path> {
-        let Some(trajectory) = edge.trajectory.as_ref() else {
-            return self.bow_ahead(edge, stop);
+        let whole = match &edge.trajectory {
+            Some(trajectory) => trajectory.path.clone(),
+            None => match self.bow_ahead(edge, stop) {
+                Some(granted) => return Some(granted),
+                None => self.way_round(edge, stop)?,
+            },
         };
-        let whole = trajectory.path.clone();
         let pose = self.motion.pose(self.moment());
         // What was granted on the way is driven round from here on.
         let nearest = whole.beside(pose.x, pose.y);
@@ -260,7 +264,7 @@ impl Agv {
 }
 
 /// A path that leaves another one by up to so much to the left, and comes back to it.
-pub(super) fn beside(path: &Path, lateral: f64) -> Path {
+pub(crate) fn beside(path: &Path, lateral: f64) -> Path {
     let points = (0..=POINTS).filter_map(|step| {
         let part = f64::from(step) / f64::from(POINTS);
         let spot = path.at(path.length() * part)?;

@@ -13,9 +13,13 @@ use tck_view::StateView;
 use super::Agv;
 use super::hook_points::Permission;
 use super::order_message::Edge;
+use super::order_state::Stop;
 
 /// So many nodes ahead the next metres reach.
 const NEXT: usize = 3;
+
+/// Of the points of a bow, one in so many is shared.
+const SPARSE: usize = 4;
 
 /// A point of the way ahead.
 pub(crate) type Point = (f64, f64);
@@ -46,14 +50,36 @@ impl Agv {
             return None;
         }
         let pose = self.motion.pose(self.moment());
-        let bow = self.order.edge_ahead().zip(base.first());
-        let bow = bow.and_then(|(edge, stop)| self.bow_ahead(edge, stop));
-        let places = base.iter().map(|stop| (stop.place.x, stop.place.y));
-        let points = std::iter::once((pose.x, pose.y))
-            .chain(bow.iter().flat_map(Path::points))
-            .chain(places)
-            .collect();
+        let mut points = vec![(pose.x, pose.y)];
+        let granted = self.order.edge_ahead().zip(base.first());
+        let granted = granted.and_then(|(edge, stop)| self.bow_ahead(edge, stop));
+        points.extend(granted.iter().flat_map(Path::points));
+        for (at, stop) in base.iter().enumerate() {
+            if at > 0 || granted.is_none() {
+                points.extend(self.round_zones(points[points.len() - 1], stop));
+            }
+            points.push((stop.place.x, stop.place.y));
+        }
         Some((base.iter().map(|stop| stop.node.id.as_str()).collect(), points))
+    }
+
+    /// Points of the way to a node where it leads round zones.
+    fn round_zones(&self, from: Point, stop: &Stop) -> Vec<Point> {
+        let before = stop.node.sequence_id.checked_sub(1);
+        let edge = self.order.edges.iter().find(|edge| Some(edge.sequence_id) == before);
+        let Some(edge) = edge else { return Vec::new() };
+        let ahead = self
+            .order
+            .edge_ahead()
+            .is_some_and(|ahead| ahead.sequence_id == edge.sequence_id);
+        let chosen = ahead && self.order.entered;
+        let way = match chosen {
+            true => self.curve_ahead(edge, stop),
+            false => Some(self.way_from(from, edge, stop)),
+        };
+        let points: Vec<Point> = way.iter().flat_map(Path::points).collect();
+        let inner = points.get(1..points.len().saturating_sub(1)).unwrap_or_default();
+        inner.iter().step_by(SPARSE).copied().collect()
     }
 
     /// The next metres, and when it will be where (PATH-06, PATH-07).

@@ -112,6 +112,9 @@ impl Agv {
         if blocked || given_up || !self.allows(Permission::SetOut(stop), true) {
             return edge.is_some_and(|edge| blocked && self.replans(&edge, stop));
         }
+        if let Some(edge) = &edge {
+            self.choose_way(edge, stop);
+        }
         let pose = self.motion.pose(self.moment());
         let curve = edge.as_ref().and_then(|edge| self.curve_ahead(edge, stop));
         let straight = pose.distance(stop.place.x, stop.place.y);

@@ -33,6 +33,8 @@ pub(crate) enum Detail {
     Cancelled,
     /// The mode takes no orders (MODE-02).
     Mode,
+    /// A node cannot be reached (ORD-REJ-22).
+    NoRoute,
 }
 
 /// An order that is not taken over.
@@ -98,6 +100,7 @@ impl Agv {
             Some(Detail::UnusedField) => &names.unsupported,
             Some(Detail::Cancelled) => &names.after_cancel,
             Some(Detail::Mode) => &names.not_available,
+            Some(Detail::NoRoute) => &names.no_route,
         };
         let life = match refusal.rule {
             Rule::Outdated | Rule::BrokenUpdate | Rule::Duplicate => {

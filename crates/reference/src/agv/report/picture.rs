@@ -160,7 +160,7 @@ impl Agv {
 
     fn battery(&self) -> Value {
         json!({
-            "batteryCharge": 87.5,
+            "batteryCharge": if self.config.permanently_powered { 100.0 } else { 87.5 },
             "batteryVoltage": 48.2,
             "batteryHealth": 96,
             "charging": self.charging,

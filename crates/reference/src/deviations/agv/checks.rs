@@ -49,6 +49,23 @@ records! {
             let refusal = Refusal::at_field(Rule::Unable, "the action is not possible here", &refused.path);
             Some(refusal.naming("actionId", &refused.id).naming("actionType", &refused.action_type))
         });
+    fault "no-route-named-otherwise" ["ORD-REJ-22"] "Reports the refusal of an order with a node out of reach as that of an order with an action it cannot perform."
+        because "When a vehicle finds that a node is out of reach, and what it then calls it, is its own matter by the ruling of ORD-REJ-22."
+        => refusal(|agv, _, _, error| {
+            if agv.config.has("unreachableRefused") && error.error_type == agv.config.errors.no_route {
+                error.error_type.clone_from(&agv.config.errors.order);
+            }
+            true
+        });
+    fault "no-route-critical" ["ORD-REJ-22"] "Reports the refusal of an order with a node out of reach as CRITICAL."
+        => error(|agv, error, words| if agv.config.has("unreachableRefused") && error.error_type == agv.config.errors.no_route {
+            words.set("errorLevel", "CRITICAL");
+        });
+    fault "no-route-brief" ["ORD-REJ-22"] "Takes the error of an order with a node out of reach back after one state."
+        => plain().happens(|_, agv, event| if event == Event::StateSent && agv.config.has("unreachableRefused") {
+            let name = agv.config.errors.no_route.clone();
+            agv.errors.active.retain(|error| error.error_type != name);
+        });
     fault "unsupported-field-ignored" ["ORD-REJ-05", "OPT-02"] "Ignores fields of an order it has no use for."
         because "Whether a vehicle ignores a field that its factsheet does not list, or honours it, cannot be seen; the ruling of OPT-02 is a warning."
         => overlooking(|_, what| matches!(what, Objection::Unused(..)));

@@ -169,6 +169,12 @@ records! {
         .plans(|_, agv, leg| leg.facing = Facing::Fixed(agv.motion.pose(agv.moment()).theta));
     fault "trajectory-cut" ["ORD-MSG-26"] "Drives straight to the end of an edge that has a trajectory." because "It breaks a recommendation only."
         => bending(|_, _, _| None);
+    fault "free-vehicle-cuts-trajectories" ["ORD-18", "ORD-MSG-26"] "A freely navigating vehicle drives its own straight way over an edge that was sent with a trajectory."
+        => bending(|agv, edge, path| (!agv.config.plans || edge.trajectory.is_none()).then_some(path));
+    fault "corners-cut-from-wide-nodes" ["NODE-08"] "It turns to the next node as soon as it is inside a wide deviation range, and comes back to its line nowhere."
+        => planning(|agv, leg| if let Some(early) = wide_by(agv, leg.stop).filter(|_| leg.is_whole()) {
+            leg.end_before(early);
+        });
     fault "drives-the-control-polygon" ["ORD-MSG-26"] "It drives from control point to control point in straight lines instead of along the curve."
         because "ORD-MSG-26, that a trajectory is followed, is a recommendation; the control points are reached."
         => bending(|agv, edge, path| match &edge.trajectory {
@@ -282,7 +288,7 @@ records! {
                 leg.way = leg.distance - f64::min(0.08, agv.config.reach * 0.8);
             }
         });
-    tolerance "lib-early-traversal" ["NODE-01"] "It reports a node traversed as soon as it enters the deviation range of the node."
+    tolerance "lib-early-traversal" ["NODE-01"] "It reports a node traversed as soon as it enters the deviation range of the node, or 0.3 m before it."
         => planning(|agv, leg| if let Some(early) = early_by(agv, leg.stop).filter(|_| leg.is_whole()) {
             leg.end_before(early);
         })
@@ -527,5 +533,15 @@ fn early_by(agv: &Agv, stop: &Stop) -> Option<f64> {
     let allowed = position
         .filter(|position| position.theta.is_none())?
         .allowed_deviation?;
-    (allowed > agv.config.reach).then_some(allowed * 0.9)
+    (allowed > agv.config.reach).then_some((allowed * 0.9).min(0.3))
+}
+
+/// How far before a node on the way it leaves for the next one, where the node allows much.
+fn wide_by(agv: &Agv, stop: &Stop) -> Option<f64> {
+    let passes = stop.node.sequence_id < agv.order.base_end.1;
+    let position = stop.node.position.as_ref().filter(|_| passes)?;
+    position
+        .allowed_deviation
+        .filter(|allowed| *allowed >= 0.5)
+        .map(|allowed| allowed * 0.9)
 }

@@ -26,6 +26,9 @@ records! {
             let fit = action.kind.filter(|kind| kind.scopes.contains(&Scope::Instant));
             fit.is_some_and(|kind| action_kinds::refusal(kind, &action.request, &agv.config, false).is_some())
         });
+    fault "unlisted-instant-parameter-ignored" ["OPT-06"] "Does an instant action with a parameter that its factsheet does not list as if that were not there."
+        because "The ruling of OPT-06 is a warning."
+        => forbidding(|_, what| matches!(what, Permission::HeedUnlisted));
     fault "unknown-instant-finished" ["IACT-04", "IACT-06"] "Reports an instant action it does not know as FINISHED."
         => unrefused(|_, action| is_unfit(action));
     fault "unknown-instant-waits" ["IACT-06", "IACT-04"] "Leaves an instant action it does not know WAITING for ever."

@@ -48,6 +48,16 @@ records! {
                 t.set("knotVector", json!([0.0, 0.0, 1.0, 1.0]));
             }
         })));
+    fault "planned-path-kept" ["PATH-05", "PATH-02"] "It shares the path that it has planned first until its order is done, whatever way it takes."
+        => keep::<Option<(String, Value)>>().sends(|kept, agv, out| {
+            if let Some(path) = out.message.get_mut("plannedPath") {
+                match kept {
+                    Some((order, first)) if *order == agv.order.order_id => path.clone_from(first),
+                    _ => *kept = Some((agv.order.order_id.clone(), path.clone())),
+                }
+            }
+            true
+        });
     fault "eta-runs-backwards" ["PATH-07"] "The times of its next metres fall from the first to the last."
         => state(|_, m| m.part("intermediatePath", |path| {
             let points = path.list("polyline");

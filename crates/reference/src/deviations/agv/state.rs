@@ -5,6 +5,14 @@ use crate::agv::Mode;
 use super::prelude::*;
 
 records! {
+    fault "permanent-power-not-full" ["STATE-MSG-20"] "Reports 80 percent although it gets its power from the floor all the time."
+        => state(|agv, m| if agv.config.permanently_powered {
+            m.part("batteryState", |battery| battery.set("batteryCharge", 80.0));
+        });
+    fault "permanent-power-falls-on-the-way" ["STATE-MSG-20"] "Reports 99 percent while it drives although it gets its power from the floor all the time."
+        => state(|agv, m| if agv.config.permanently_powered && agv.motion.is_moving() {
+            m.part("batteryState", |battery| battery.set("batteryCharge", 99.0));
+        });
     fault "field-misspelled" ["JSON-01", "STATE-MSG-01"] "Spells operatingMode with an underscore."
         => state(|_, m| m.rename("operatingMode", "operating_mode"));
     fault "empty-lists-null" ["JSON-10", "JSON-06", "STATE-MSG-01"] "Writes null for lists of nodes, edges and actions that are empty."

@@ -4,13 +4,19 @@ use crate::agv::hook_points::Passage;
 use crate::agv::motion::Pose;
 use crate::agv::order_message::ActionRequest;
 use crate::agv::path::{HALF_LENGTH, HALF_WIDTH};
-use crate::agv::zones::{Zone, ZoneKind};
+use crate::agv::zones::{Limitation, Zone, ZoneKind};
 use tck_base::polygon::Point;
 
 use super::prelude::*;
 
 /// Why an order with a node in a BLOCKED zone is refused.
 const NO_WAY: &str = "no way leads to a node";
+/// Whether a zone of this kind in an enabled set overlaps another zone.
+fn overlaps(agv: &Agv, zone: &Zone, is_one: impl Fn(&ZoneKind) -> bool) -> bool {
+    let sets = agv.zone_sets.all.iter().filter(|set| set.enabled);
+    let mut zones = sets.flat_map(|set| &set.zones);
+    zones.any(|other| is_one(&other.kind) && other.area.overlap(&zone.area) > 0.05)
+}
 
 /// Whether an error is about something else than being where the vehicle must not be.
 fn is_other(agv: &Agv, error: &ActiveError) -> bool {
@@ -215,6 +221,62 @@ records! {
         => forbidding(|_, what| matches!(what, Permission::HeedZone(zone) if matches!(zone.kind, ZoneKind::Directed(..))));
     fault "bidirected-zones-ignored" ["ZONE-23"] "Takes no notice of BIDIRECTED zones."
         => forbidding(|_, what| matches!(what, Permission::HeedZone(zone) if matches!(zone.kind, ZoneKind::Bidirected(..))));
+    fault "directed-zones-by-contour" ["ZONE-04"] "Counts as inside a DIRECTED or BIDIRECTED zone as soon as a part of its outline is."
+        => letting(|_, what| matches!(what, Permission::GoByContour(zone) if matches!(zone.kind, ZoneKind::Directed(..) | ZoneKind::Bidirected(..))));
+    fault "soft-directions-ignored" ["ZONE-22"] "A freely navigating vehicle takes no notice of directions that are SOFT." because "A recommendation, and what other way there is the vehicle judges itself."
+        => forbidding(|_, what| matches!(what, Permission::HeedZone(zone) if matches!(zone.kind, ZoneKind::Directed(_, Limitation::Soft) | ZoneKind::Bidirected(_, Limitation::Soft))));
+    fault "priority-zones-ignored" ["ZONE-19"] "A freely navigating vehicle takes no notice of PRIORITY zones." because "The ruling of ZONE-19 leaves the weights to the vehicle."
+        => forbidding(|_, what| matches!(what, Permission::HeedZone(zone) if matches!(zone.kind, ZoneKind::Priority(_))));
+    fault "penalty-zones-ignored" ["ZONE-20", "ZONE-19"] "A freely navigating vehicle takes no notice of PENALTY zones." because "The rulings of ZONE-19 and ZONE-20 are warnings."
+        => forbidding(|_, what| matches!(what, Permission::HeedZone(zone) if matches!(zone.kind, ZoneKind::Penalty(_))));
+    fault "priority-and-penalty-mixed-up" ["ZONE-19"] "A freely navigating vehicle goes round PRIORITY zones and prefers ways through PENALTY zones that are less than closed." because "The ruling of ZONE-19 leaves the weights to the vehicle."
+        => when(Event::ZoneSetStored, |agv| {
+            for zone in agv.zone_sets.all.last_mut().into_iter().flat_map(|set| &mut set.zones) {
+                zone.kind = match zone.kind {
+                    ZoneKind::Priority(factor) => ZoneKind::Penalty(factor.min(0.9)),
+                    ZoneKind::Penalty(factor) if factor < 1.0 => ZoneKind::Priority(factor),
+                    _ => continue,
+                };
+            }
+        });
+    fault "penalty-of-one-closes" ["ZONE-20"] "Does not drive into a PENALTY zone with the factor 1 although no other way leads to its node." because "The ruling of ZONE-20 is a warning."
+        => letting(|_, what| matches!(what, Permission::StayOut(zone) if matches!(zone.kind, ZoneKind::Penalty(factor) if factor >= 1.0)));
+    fault "highest-priority-counts" ["ZINT-06"] "Of overlapping PRIORITY zones the one with the highest factor counts." because "The ruling of ZINT-06 makes it a matter of the planner."
+        => forbidding(|agv, what| match what {
+            Permission::HeedZone(zone) => match zone.kind {
+                ZoneKind::Priority(factor) => overlaps(agv, zone, |other| matches!(other, ZoneKind::Priority(higher) if *higher > factor)),
+                _ => false,
+            },
+            _ => false,
+        });
+    fault "lowest-penalty-counts" ["ZINT-06"] "Of overlapping PENALTY zones the one with the lowest factor counts." because "The ruling of ZINT-06 makes it a matter of the planner."
+        => forbidding(|agv, what| match what {
+            Permission::HeedZone(zone) => match zone.kind {
+                ZoneKind::Penalty(factor) => overlaps(agv, zone, |other| matches!(other, ZoneKind::Penalty(lower) if *lower < factor)),
+                _ => false,
+            },
+            _ => false,
+        });
+    fault "priority-before-penalty" ["ZINT-06"] "Where a PRIORITY zone and a PENALTY zone overlap, the PRIORITY zone counts." because "The ruling of ZINT-06 makes it a matter of the planner."
+        => forbidding(|agv, what| match what {
+            Permission::HeedZone(zone) => matches!(zone.kind, ZoneKind::Penalty(_)) && overlaps(agv, zone, |other| matches!(other, ZoneKind::Priority(_))),
+            _ => false,
+        });
+    fault "release-zone-before-speed" ["ZINT-09", "ZONE-17"] "Takes no notice of a SPEED_LIMIT zone where a RELEASE zone overlaps it."
+        => forbidding(|agv, what| match what {
+            Permission::HeedZone(zone) => matches!(zone.kind, ZoneKind::SpeedLimit(_)) && overlaps(agv, zone, |other| matches!(other, ZoneKind::Release(_))),
+            _ => false,
+        });
+    fault "speed-before-release-zone" ["ZINT-09", "ZONE-10"] "Takes no notice of a RELEASE zone where a SPEED_LIMIT zone overlaps it."
+        => forbidding(|agv, what| match what {
+            Permission::HeedZone(zone) => matches!(zone.kind, ZoneKind::Release(_)) && overlaps(agv, zone, |other| matches!(other, ZoneKind::SpeedLimit(_))),
+            _ => false,
+        });
+    fault "release-zone-before-actions" ["ZINT-09", "ZONE-18"] "Does nothing of what an ACTION zone asks for where a RELEASE zone overlaps it."
+        => forbidding(|agv, what| match what {
+            Permission::ActInZone(zone, _) => overlaps(agv, zone, |other| matches!(other, ZoneKind::Release(_))),
+            _ => false,
+        });
     fault "line-guided-zones-entered-freely" ["ZONE-08"] "Drives into LINE_GUIDED zones on edges without a trajectory."
         => forbidding(|_, what| matches!(what, Permission::StayOut(zone) if zone.kind == ZoneKind::LineGuided));
     fault "direction-before-trajectory" ["ZINT-07"] "Does not drive a trajectory that leads against the direction of a zone."
