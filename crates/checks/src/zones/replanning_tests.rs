@@ -77,7 +77,7 @@ fn through(trace: &mut Trace, way: &Value) {
 
 #[test]
 fn who_asks_waits_and_keeps_to_the_way_is_not_accused() {
-    let mut trace = granted(&straight());
+    let trace = granted(&straight());
     for check in [
         "zones/replanning-asked",
         "zones/replanning-granted",
