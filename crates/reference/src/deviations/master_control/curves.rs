@@ -135,6 +135,7 @@ records! {
         });
     fault "wide-corridor-before-a-narrow-one" ["CORR-04"]
         "Corridors of 2 m and of 0.1 m to each side take turns, and a node before a narrow one has an allowedDeviationXY of 1.5 m where the vehicle supports that."
+        because "Where the vehicle really passes the node is its own affair, so that CORR-04 leaves a warning."
         => composing(|_, vehicle, worded, m| {
             let sheet = vehicle.factsheet.as_ref();
             let takes = sheet.is_some_and(|sheet| sheet.support("order.nodes.nodePosition.allowedDeviationXY").is_some());
