@@ -124,6 +124,7 @@ records! {
             if index % 2 == 0 { widths(corridor, both, 0.0) } else { widths(corridor, 0.0, both) }
         }));
     fault "corridor-narrower-than-node" ["CORR-04"] "It sends a corridor that is narrower than the allowed deviation at the node where the edge begins."
+        because "Where the vehicle really passes the node is its own affair, so that CORR-04 leaves a warning."
         => composing(|_, _, _, m| {
             let allowed: Vec<_> = m.list("nodes").iter().map(|node| node.pointer("/nodePosition/allowedDeviationXY").and_then(Value::as_f64)).collect();
             let mut allowed = allowed.into_iter();
