@@ -129,6 +129,7 @@ records! {
             if index % 2 == 0 { widths(corridor, both, 0.0) } else { widths(corridor, 0.0, both) }
         }));
     fault "corridor-narrower-than-node" ["CORR-04"] "It sends a corridor that is narrower than the allowed deviation at the node where the edge begins."
+        because "Where the vehicle really passes the node is its own affair, so that CORR-04 leaves a warning."
         => composing(|_, _, _, m| {
             let allowed: Vec<_> = m.list("nodes").iter().map(|node| node.pointer("/nodePosition/allowedDeviationXY").and_then(Value::as_f64)).collect();
             let mut allowed = allowed.into_iter();
@@ -140,6 +141,7 @@ records! {
         });
     fault "wide-corridor-before-a-narrow-one" ["CORR-04"]
         "Corridors of 2 m and of 0.1 m to each side take turns, and a node before a narrow one has an allowedDeviationXY of 1.5 m where the vehicle supports that."
+        because "Where the vehicle really passes the node is its own affair, so that CORR-04 leaves a warning."
         => composing(|_, vehicle, worded, m| {
             let sheet = vehicle.factsheet.as_ref();
             let takes = sheet.is_some_and(|sheet| sheet.support("order.nodes.nodePosition.allowedDeviationXY").is_some());
