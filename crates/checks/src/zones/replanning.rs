@@ -38,7 +38,7 @@ pub(crate) const REPLANNING_SENT: Check = Check {
     name: "zones/replanning-sent",
     decides: &["ZREQ-16"],
     doc: "When a vehicle drives an edge with a trajectory in a COORDINATED_REPLANNING zone, the trajectories of its requests for that \
-          zone lead where the part of that trajectory inside the zone leads, within 0.3 m. Judged once it has driven 0.3 m there, \
+          zone lead where the part of that trajectory inside the zone leads, within 0.3 m. Judged once it has driven 0.2 m there, \
           where it was clear of the zone before, where it has sent a trajectory, where no LINE_GUIDED zone is met, and where \
           the order lets it leave its trajectories neither in a corridor nor at a node.",
     arguments: &[],
@@ -71,7 +71,7 @@ const NEEDS: &[tck_view::Field] = &[
 /// How far from a way a vehicle, or another way, may be, in metres. Twice as far a vehicle is on none of its ways.
 const BESIDE: f64 = 0.3;
 /// How far a vehicle goes on along a way until it is said to drive it, in metres.
-const ALONG: f64 = 0.3;
+const ALONG: f64 = 0.2;
 /// A trajectory is looked at in steps of so many metres, and so many of them.
 const STEP: f64 = 0.2;
 const STEPS: u32 = 2_000;
@@ -223,8 +223,11 @@ impl Ways {
                 let begun = access.begun.filter(|(last, _)| *last == edge);
                 let (_, begin) = begun.unwrap_or((edge, (place.pose.x, place.pose.y)));
                 let compared = Some((edge, access.ways.len()));
+                if access.compared == compared {
+                    return Some((Weight::Nothing, String::new()));
+                }
                 // One that says that it drives may still be about to ask.
-                let off = match access.compared != compared && has_gone(begin, place) {
+                let off = match has_gone(begin, place) {
                     true => self.off_its_edge(access, edge, state, zone, place),
                     false => None,
                 };
