@@ -152,15 +152,15 @@ records! {
         => after(Effect::Trigger, |_, _, _| Outcome::Done(None));
     fault "any-trigger-will-do" ["ACT-37"] "A button on the vehicle ends what waits for the fleet control alone." because "The text does not say that nothing else may end it."
         => letting(|_, what| matches!(what, Permission::HeedTrigger(action) if action.status == Status::Running));
-    fault "certificate-fetched-in-clear" ["CERT-03"] "It fetches key and certificate over plain HTTP, and takes them over."
+    fault "certificate-fetched-in-clear" ["CERT-03", "CERT-02"] "It fetches key and certificate over plain HTTP, and takes them over."
         => forbidding(|_, what| matches!(what, Permission::RefusePlainLink | Permission::RefuseCertificate(Flaw::Unreadable)));
-    fault "certificate-not-downloaded" ["CERT-01"] "It reports updateCertificate FINISHED without having fetched a file."
+    fault "certificate-not-downloaded" ["CERT-01", "CERT-02"] "It reports updateCertificate FINISHED without having fetched a file."
         => forbidding(|_, what| matches!(what, Permission::FetchForCertificate(_)));
-    fault "certificate-key-kept" ["CERT-01"] "It fetches a new certificate, and goes on with the key it has."
+    fault "certificate-key-kept" ["CERT-01", "CERT-02"] "It fetches a new certificate, and goes on with the key it has."
         => forbidding(|_, what| matches!(what, Permission::FetchForCertificate("keyDownloadLink")));
     fault "old-certificate-kept" ["CERT-01"] "It fetches a new key, and goes on with the certificate it has."
         => forbidding(|_, what| matches!(what, Permission::FetchForCertificate("certificateDownloadLink")));
-    fault "certificate-authority-kept" ["CERT-01"] "It does not fetch the authority that a new certificate comes with." because "The parameter is optional: a warning."
+    fault "certificate-authority-kept" ["CERT-01", "CERT-04"] "It does not fetch the authority that a new certificate comes with." because "The parameter is optional: a warning."
         => forbidding(|_, what| matches!(what, Permission::FetchForCertificate("certificateAuthorityDownloadLink")));
     fault "certificate-never-active" ["CERT-01"] "It leaves updateCertificate RUNNING for ever when it has all files."
         => action(|_, action, m| {
