@@ -103,14 +103,6 @@ records! {
 
     tolerance "replanning-one-way-only" ["ZREQ-07", "ZREQ-14"] "It asks for one way through a COORDINATED_REPLANNING zone, and offers no other one."
         => forbidding(|_, what| matches!(what, Permission::OfferAlternative));
-    tolerance "replanning-way-loosely-kept" ["ZONE-16"] "In a COORDINATED_REPLANNING zone it drives 20 centimetres beside its way."
-        => position(|agv, p| {
-            if agv.heeding.inside.iter().any(|(_, zone)| is_replanning(zone)) {
-                let heading = p.get("theta").and_then(Value::as_f64).unwrap_or_default();
-                p.change("x", |x| *x = json!(x.as_f64().unwrap_or_default() - 0.2 * heading.sin()));
-                p.change("y", |y| *y = json!(y.as_f64().unwrap_or_default() + 0.2 * heading.cos()));
-            }
-        });
     tolerance "replanning-lost-removed" ["ZREQ-15", "REQ-12"] "It removes the request whose grant is lost in a COORDINATED_REPLANNING zone at once."
         => wording(|_, request, _| !request.is_lost());
     tolerance "replanning-way-from-the-border" ["ZREQ-07", "ZREQ-16"] "Of its way it sends the part in the zone only."
