@@ -12,7 +12,19 @@ use super::prelude::*;
 fn overlaps(agv: &Agv, zone: &Zone, is_one: impl Fn(&ZoneKind) -> bool) -> bool {
     let sets = agv.zone_sets.all.iter().filter(|set| set.enabled);
     let mut zones = sets.flat_map(|set| &set.zones);
-    zones.any(|other| is_one(&other.kind) && other.area.overlap(&zone.area) > 0.05)
+    // Zones that lie side by side have a border in common, and no middle.
+    let shares = |other: &Zone| other.area.contains(middle(zone)) || zone.area.contains(middle(other));
+    zones.any(|other| is_one(&other.kind) && shares(other))
+}
+
+/// The middle of the corners of a zone.
+fn middle(zone: &Zone) -> Point {
+    let corners = zone.area.corners();
+    let (x, y) = corners
+        .iter()
+        .fold((0.0, 0.0), |sum, corner| (sum.0 + corner.x, sum.1 + corner.y));
+    let count = corners.len().max(1) as f64;
+    Point::new(x / count, y / count)
 }
 
 /// Whether an error is about something else than being where the vehicle must not be.
