@@ -122,7 +122,8 @@ fn named(name: &str, now: jiff::Timestamp) -> rcgen::CertificateParams {
     params
 }
 
-#[cfg(all(test, feature = "tls"))]
+#[cfg(test)]
+#[cfg(feature = "tls")]
 mod tests {
     use super::*;
 

@@ -31,7 +31,7 @@ const APART: f64 = 0.1;
 #[derive(Default)]
 struct Followed {
     /// It was seen on the curve, where that is no straight line.
-    followed: bool,
+    curved: bool,
     /// Where it was seen on the straight line.
     straight: Option<(f64, f64)>,
     told: bool,
@@ -57,7 +57,7 @@ impl Running for Followed {
             return false;
         };
         if bend.beside.distance <= NEAR {
-            self.followed |= bend.aside > ASIDE;
+            self.curved |= bend.aside > ASIDE;
             return bend.aside > ASIDE;
         }
         let text = format!(
@@ -71,7 +71,7 @@ impl Running for Followed {
         if lane.along(pose).is_some_and(|along| along.off <= STRAIGHT) {
             let first = *self.straight.get_or_insert((pose.x, pose.y));
             let apart = (first.0 - pose.x).hypot(first.1 - pose.y) >= APART;
-            if apart && !self.followed && !self.failed {
+            if apart && !self.curved && !self.failed {
                 self.failed = true;
                 findings.push(broken("ORD-18", now.seq, format!("{text}, and goes straight on")));
             }

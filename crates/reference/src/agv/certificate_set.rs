@@ -4,6 +4,7 @@ use bytes::Bytes;
 
 /// What is wrong with a certificate that was fetched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(not(feature = "tls"), expect(dead_code, reason = "no certificate is looked into"))]
 pub(crate) enum Flaw {
     /// A file is not what it has to be.
     Unreadable,
@@ -32,6 +33,7 @@ pub(crate) fn flaw(key: &Bytes, certificate: &Bytes, authority: Option<&Bytes>, 
 
 /// Without TLS nothing is read, and no certificate is taken (`action_kinds`).
 #[cfg(not(feature = "tls"))]
+#[expect(clippy::unnecessary_wraps, reason = "as with TLS")]
 pub(crate) fn flaw(_: &Bytes, _: &Bytes, _: Option<&Bytes>, _: jiff::Timestamp) -> Option<Flaw> {
     Some(Flaw::Unreadable)
 }

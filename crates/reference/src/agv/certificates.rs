@@ -48,7 +48,7 @@ impl Agv {
     /// Asks for the next file of an updateCertificate action, or has them all.
     fn fetch_next(&mut self, action: &Action) -> Outcome {
         let missing = |key: &&'static str| action.files.iter().all(|(had, _)| had != key);
-        let wanted = |key: &&'static str| missing(key) && self.allows(Permission::FetchForCertificate(*key), true);
+        let wanted = |key: &&'static str| missing(key) && self.allows(Permission::FetchForCertificate(key), true);
         let Some(key) = named(action).find(wanted) else {
             return self.activated(action);
         };

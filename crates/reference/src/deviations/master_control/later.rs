@@ -81,7 +81,7 @@ records! {
                     site.publish(vehicle, "instantActions", &json!({ "actions": actions }));
                     *due = Some(now + Duration::from_secs(10));
                 }
-                due.into_iter().for_each(|at| vehicle.at(*at));
+                due.iter().for_each(|at| vehicle.at(*at));
             }
             _ => {}
         });

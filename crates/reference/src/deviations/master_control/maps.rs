@@ -99,11 +99,11 @@ records! {
     fault "download-repeated-every-ten-seconds" ["MAP-28"]
         "It sends a download that was refused as a duplicate again every ten seconds and never deletes the map."
         => keep::<Vec<(Moment, SiteMap)>>().happens(|again, site, vehicle, event| match event {
-            Event::RolledOut(job, false, next, done) => if job.stage != Stage::Delete && is_duplicate(vehicle, job) {
+            Event::RolledOut(job, false, next, done) if job.stage != Stage::Delete && is_duplicate(vehicle, job) => {
                 again.push((site.now.moment + Duration::from_secs(10), job.map.clone()));
                 **next = None;
                 **done = true;
-            },
+            }
             Event::Looked => {
                 let now = site.now.moment;
                 let (due, later): (Vec<_>, Vec<_>) = std::mem::take(again).into_iter().partition(|(at, _)| *at <= now);
