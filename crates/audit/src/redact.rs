@@ -112,9 +112,19 @@ impl Members {
         self.names.get(member).copied()
     }
 
-    fn is_coordinate(&self, name: &str) -> bool {
-        self.coordinates.iter().any(|(x, y)| x == name || y == name)
+    /// How far the floor moves along the axis that a member of this name measures; `None` for a member that is no coordinate.
+    fn offset(&self, name: &str, origin: (f64, f64)) -> Option<f64> {
+        self.coordinates.iter().find_map(|(x, y)| match name {
+            _ if name == x => Some(origin.0),
+            _ if name == y => Some(origin.1),
+            _ => None,
+        })
     }
+}
+
+/// A coordinate, measured from another origin, to the tenth of a millimetre, so that no digit tells where it was.
+fn moved(at: f64, from: f64) -> Value {
+    Value::from(((at - from) * 10_000.0).round() / 10_000.0)
 }
 
 /// Replaces names and places, always alike.
@@ -213,10 +223,16 @@ impl Redactor {
         let beside = pairs.filter_map(|(key, value)| Some((key_of(object, key)?, value.clone())));
         for (key, value) in beside.collect::<Vec<_>>() {
             let kind = self.members.kind_of(&key).unwrap_or("value");
-            let is_coordinate = self.members.is_coordinate(&key);
-            match object.get_mut(&value) {
-                Some(Value::String(text)) => *text = self.name(kind, text),
-                Some(number @ Value::Number(_)) if is_coordinate => *number = Value::from(0),
+            let offset = self.members.offset(&key, self.origin.unwrap_or_default());
+            match (object.get_mut(&value), offset) {
+                (Some(Value::String(text)), _) => *text = self.name(kind, text),
+                // Before any place is known there is nothing to measure from.
+                (Some(number @ Value::Number(_)), Some(from)) => {
+                    *number = match number.as_f64().filter(|_| self.origin.is_some()) {
+                        Some(at) => moved(at, from),
+                        None => Value::from(0),
+                    };
+                }
                 _ => {}
             }
         }
@@ -259,8 +275,6 @@ impl Redactor {
         let mut found = names.filter_map(|names| Some((names.clone(), (number(&names.0)?, number(&names.1)?))));
         if let Some(((x, y), at)) = found.next() {
             let from = *self.origin.get_or_insert(at);
-            // To the tenth of a millimetre, so that no digit tells where it was.
-            let moved = |at: f64, from: f64| Value::from(((at - from) * 10_000.0).round() / 10_000.0);
             object.insert(x, moved(at.0, from.0));
             object.insert(y, moved(at.1, from.1));
         }

@@ -509,7 +509,7 @@ mod tests {
                 _ => None,
             })
             .collect();
-        assert_eq!(reasons.len(), 18);
+        assert_eq!(reasons.len(), 19);
         assert!(reasons.iter().all(|reason| reason.len() > 20));
     }
 
