@@ -472,8 +472,8 @@ pub(crate) fn refusal(
         }
     }
     if strict {
-        // The version itself has this one, and no factsheet lists it.
-        let named = kind.effect == Effect::CancelOrder && config.has("cancelByOrderId");
+        // No factsheet lists this one.
+        let named = kind.effect == Effect::CancelOrder;
         let known =
             |key: &str| kind.parameters.iter().any(|parameter| parameter.key == key) || named && key == "orderId";
         if let Some((key, _)) = request.parameters.iter().find(|(key, _)| !known(key)) {

@@ -186,7 +186,9 @@ records! {
             Permission::Clear(kind) => usual && !site.offers(vehicle, kind, "NODE"),
             _ => usual,
         }).plans(|(), site, vehicle, way, _, fresh| {
-            let Some(state) = vehicle.state.as_ref().filter(|_| fresh && vehicle.config.has("instantActionStates")) else { return };
+            // What was sent and not seen yet would vanish from the list unseen.
+            let settled = fresh && vehicle.instants.is_empty() && vehicle.config.has("instantActionStates");
+            let Some(state) = vehicle.state.as_ref().filter(|_| settled) else { return };
             let lists = [("clearInstantActions", &state.instant_action_states), ("clearZoneActions", &state.zone_action_states)];
             let ended = |list: &[ActionState]| !list.is_empty() && list.iter().all(ActionState::is_terminal);
             let kinds: Vec<&str> = lists.into_iter().filter(|(kind, list)| ended(list) && site.offers(vehicle, kind, "NODE")).map(|(kind, _)| kind).collect();
