@@ -88,6 +88,10 @@ impl ModeSpeed {
         let (Some(took), Some(usually)) = (drive.took, usual.took) else {
             return false;
         };
+        // A drive of which the states show only where it stood says nothing about its speed.
+        if usual.reported.is_some_and(|speed| speed <= NOISE) {
+            return false;
+        }
         let sooner = took.as_secs_f64() * SHARE < usually.as_secs_f64();
         match (drive.reported, usual.reported) {
             (Some(speed), Some(limit)) if sooner && speed > limit * SHARE + NOISE => {
